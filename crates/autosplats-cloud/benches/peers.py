@@ -1,6 +1,6 @@
-"""Reads one file with every peer that can, and prints a JSON line for each: name, points, best wall and CPU seconds.
+"""Reads one file with every capable peer, and prints a JSON line for each: name, points, best wall and CPU seconds.
 
-Called by the benchmark `peers`; a peer that is not installed says so.
+Called by the benchmark `peers`. A peer that is not installed is reported as missing.
 """
 
 import json
@@ -76,7 +76,7 @@ def main():
         except ImportError as error:
             print(json.dumps({"name": peer.__name__, "missing": str(error)}))
             continue
-        except Exception as error:  # A peer that fails is a result, too.
+        except Exception as error:  # A failing peer is a result too.
             print(json.dumps({"name": peer.__name__, "missing": f"fails: {str(error)[:80]}"}))
             continue
         print(json.dumps({"name": peer.__name__, "points": points, "wall": best[0], "cpu": best[1]}))

@@ -1,8 +1,8 @@
-//! Reading against other programs, side by side in one run:
-//! `cargo bench -p autosplats-cloud --bench peers -- PYTHON [POINTS]`.
+//! Compares reading with other programs, side by side in one run: `cargo bench -p autosplats-cloud --bench peers --
+//! PYTHON [POINTS]`.
 //!
-//! PYTHON is an interpreter that has some of open3d, laspy[lazrs], pye57, plyfile and numpy; the command `pdal` is asked
-//! if it is there. Each format's file is written once and read three times by each; the best is shown.
+//! PYTHON is an interpreter with some of open3d, laspy[lazrs], pye57, plyfile and numpy. The command `pdal` is used if
+//! present. Each format's file is written once, and every program reads it three times. The best time is printed.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run should say so and stop")]
 
@@ -13,7 +13,7 @@ use autosplats_cloud::{FieldValues, PointCloud, Scene, glam::DVec3, read, write}
 const REPEATS: usize = 3;
 
 fn main() {
-    // Cargo adds --bench.
+    // Cargo adds `--bench`.
     let args: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
     let Some(python) = args.first() else {
         println!("which Python? cargo bench -p autosplats-cloud --bench peers -- PYTHON [POINTS]");
@@ -32,7 +32,7 @@ fn main() {
     }
 }
 
-/// A coloured statue in survey coordinates, as a scanner might have recorded it.
+/// A coloured statue in survey coordinates, like a recorded scan.
 fn survey(points: usize) -> PointCloud {
     let (scene, _) = Scene::parse("statue").unwrap();
     let statue = scene.sample(points, &|_| true).unwrap();

@@ -1,11 +1,10 @@
-//! Points per second from PointCloud2 messages in memory, one core: `cargo bench -p autosplats-cloud --bench point_cloud2
-//! [-- POINTS | RECORDING...]`.
+//! Points per second from PointCloud2 messages in memory, on one core: `cargo bench -p autosplats-cloud --bench
+//! point_cloud2 [-- POINTS | RECORDING...]`.
 //!
-//! Of recordings, how long they take to be opened and played, on all cores.
+//! For recordings: the time to open and to play them, on all cores.
 //!
-//! Beside each layout stands how long it takes in copies of the same bytes into fresh memory. The general path is what any
-//! layout takes: here the same points with x and y stored the other way round. The best of many rounds is printed, as the
-//! others contain what else the computer did.
+//! Each layout is compared with copying the same bytes into fresh memory. The general path handles any layout; here x
+//! and y are swapped. The best of many rounds is printed, since other rounds include other work of the computer.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run should say so and stop")]
 
@@ -26,7 +25,7 @@ use autosplats_cloud::{
 use ros::{Cloud2, F32};
 
 fn main() {
-    // Cargo adds --bench.
+    // Cargo adds `--bench`.
     let args: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
     let points = match args.first().map(|arg| arg.parse()) {
         Some(Err(_)) => return args.iter().for_each(|file| play(Path::new(file))),

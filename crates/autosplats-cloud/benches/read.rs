@@ -1,6 +1,8 @@
-//! Points per second from files in the page cache: `cargo bench -p autosplats-cloud --bench read [-- POINTS | FILE...]`.
+//! Points per second from files in the page cache: `cargo bench -p autosplats-cloud --bench read [-- POINTS |
+//! FILE...]`.
 //!
-//! Without files, some are generated. Each file is written once and read five times; the best is printed, as the others contain what else the computer did.
+//! Without files, some are generated. Each file is written once and read five times. The best time is printed, since
+//! other rounds include other work of the computer.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run should say so and stop")]
 
@@ -9,7 +11,7 @@ use std::{path::Path, time::Instant};
 use autosplats_cloud::{FieldValues, PointCloud, glam::DVec3, read, write};
 
 fn main() {
-    // Cargo adds --bench.
+    // Cargo adds `--bench`.
     let args: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
     let points = match args.first().map(|arg| arg.parse()) {
         Some(Err(_)) => return args.iter().for_each(|file| time(file.as_ref(), file)),

@@ -1,6 +1,6 @@
 //! Rays per second of simulated scanners: `cargo bench -p autosplats-cloud --bench scanner [-- FILES_OR_SCENE...]`.
 //!
-//! Four scanners of 640 by 480 rays look at each of the things named: a folder of meshes, or `scene:NAME`.
+//! Four scanners of 640 by 480 rays scan each argument: a folder of meshes, or `scene:NAME`.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run should say so and stop")]
 
@@ -11,11 +11,11 @@ use std::{
 
 use autosplats_cloud::{Animation, Next, ReadOptions, Scene, Stream as _};
 
-/// Frames that are scanned; the best one counts, as the others contain what else the computer did.
+/// Number of scanned frames. The best one counts, since the others include other work of the computer.
 const FRAMES: usize = 8;
 
 fn main() {
-    // Cargo adds --bench.
+    // Cargo adds `--bench`.
     let named: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
     let horse = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/animation/horse_gallop");
     let usual = [horse.to_str().unwrap(), "scene:figure", "scene:herd"].map(str::to_owned);
@@ -31,7 +31,7 @@ fn main() {
         let scanned = animation.scanned(scanners, 1).unwrap();
         let mut best = (Duration::MAX, 0);
         for frame in 0..scanned.timeline().len().min(FRAMES) {
-            // Each in a new stream: nothing is read ahead.
+            // Each frame in a new stream, so that nothing is read ahead.
             let mut stream = scanned.play();
             stream.seek(frame);
             let start = Instant::now();

@@ -1,4 +1,4 @@
-//! Memory that reading takes, in a process of its own.
+//! Measures the memory that reading takes, in a separate process.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
@@ -8,7 +8,7 @@ mod common;
 use autosplats_cloud::{FieldValues, PointCloud, glam::DVec3, write};
 use common::{positions, read_bytes};
 
-/// A number of kilobytes that Linux tells of this process.
+/// A value of `/proc/self/status` in kilobytes.
 fn status(name: &str) -> Option<usize> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix(name))?;
@@ -17,7 +17,7 @@ fn status(name: &str) -> Option<usize> {
 
 #[test]
 fn points_that_are_only_claimed_take_no_memory() {
-    // Two chunks, the first with colours of 8 bits and the second with a wider one.
+    // Two chunks, the first with 8-bit colours and the second with a wider one.
     const CHUNK: usize = 50_000;
     const CLAIMED: u32 = 40_000_000;
     let channel = |i: usize| if i == 2 * CHUNK - 1 { 60_000_u16 } else { 200 };
@@ -33,7 +33,7 @@ fn points_that_are_only_claimed_take_no_memory() {
     let mut bytes = std::fs::read(&path).unwrap();
     let user = bytes.windows(14).position(|word| word == b"laszip encoded").unwrap();
     let mut put = |at: usize, value: u32| bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
-    // The length of chunks in the compression record, and the number of points.
+    // Length of chunks in the compression record, and the number of points.
     put(user + 52 + 12, CLAIMED);
     put(107, CLAIMED + CHUNK as u32);
 
@@ -42,6 +42,6 @@ fn points_that_are_only_claimed_take_no_memory() {
     assert!((2 * CHUNK..2 * CHUNK + 1000).contains(&cloud.len()), "{} points are real", cloud.len());
     assert_eq!(cloud.colors().unwrap()[CHUNK - 1], [0; 3], "one large value makes the others small");
     let (Some(before), Some(peak)) = (before, status("VmHWM")) else { return };
-    // A byte for each would be 40 MB, and the points that are there are a tenth of that.
+    // One byte per claimed point would be 40 MB. The real points need a tenth of that.
     assert!(peak < before + 30_000, "{} kB more for a file of {} kB", peak - before, bytes.len() / 1000);
 }

@@ -1,5 +1,5 @@
-//! How fast live points are, and that they take no more memory by time. Measurements, which take minutes:
-//! `cargo test --release -p autosplats-cloud --features zenoh --test remote_speed -- --ignored --nocapture`.
+//! Measures the speed of live points, and checks that memory does not grow. Takes minutes: `cargo test --release -p
+//! autosplats-cloud --features zenoh --test remote_speed -- --ignored --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
@@ -26,14 +26,14 @@ fn now() -> i64 {
     UNIX_EPOCH.elapsed().unwrap().as_nanos() as i64
 }
 
-/// Kilobytes of memory that this process has.
+/// Resident memory of this process in kilobytes.
 fn resident() -> usize {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
     line.trim().trim_end_matches(" kB").parse().unwrap()
 }
 
-/// `count` points at 20 Hz from a node through a router.
+/// Sends `count` points at 20 Hz from a node through a router.
 fn measure(count: usize, step: u32, seconds: u64) {
     let port = free_port();
     let _router = listener("router", port);
@@ -42,7 +42,7 @@ fn measure(count: usize, step: u32, seconds: u64) {
     let mut message = Cloud2 { stamp: 0, ..Cloud2::xyz(&positions(count), step) }.cdr();
     let bytes = message.len();
     let sent = thread::spawn(move || {
-        // The sender's side drops messages too, by default, when the machine is busy; those are none of ours.
+        // By default the sender drops messages on a busy machine, which would count against the receiver.
         let publisher = sensor.declare_publisher(rmw_key(0, "points"));
         let publisher = publisher.congestion_control(CongestionControl::Block).wait().unwrap();
         while !publisher.matching_status().wait().unwrap().matching() {

@@ -1,11 +1,11 @@
-"""Publishes PointCloud2 messages over Zenoh as rmw_zenoh and the bridge from DDS do, until its input ends.
+"""Publishes PointCloud2 messages over Zenoh like rmw_zenoh and the bridge from DDS, until the input ends.
 
-Usage: publish_points.py PORT [POINTS SECONDS]. Needs what requirements.txt lists. None of the bytes are made by the code under
-test: rosbags writes the messages, numpy the points.
+Usage: publish_points.py PORT [POINTS SECONDS]. Needs the packages of requirements.txt. The code under test makes none of
+the bytes: rosbags writes the messages, numpy the points.
 
-Two sensors send twenty times a second, and their robot says where they are: what is fixed once, before anybody listens, into
-the cache of Zenoh's advanced publisher. With POINTS and SECONDS it is the first sensor alone, with so many points and the
-time of each message as its stamp; at the end the number of messages is printed.
+Two sensors send twenty times a second, and their robot sends transforms. Fixed transforms are sent once, before anybody
+listens, to the cache of Zenoh's advanced publisher. With POINTS and SECONDS, only the first sensor sends, with that number
+of points and the time of sending as stamp. At the end the number of messages is printed.
 """
 
 import sys
@@ -22,14 +22,14 @@ CLOUD = "sensor_msgs/msg/PointCloud2"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 if TRANSFORMS not in STORE.types:
     STORE.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", TRANSFORMS))
-# The hashes are those that ROS 2 Jazzy has for these types.
+# Hashes of these types in ROS 2 Jazzy.
 POINTS_KEY = (
     "sensor_msgs::msg::dds_::PointCloud2_/RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"
 )
 TRANSFORMS_KEY = (
     "tf2_msgs::msg::dds_::TFMessage_/RIHS01_e369d0f05a23ae52508854b66f6aa04437f3449d652e8cbf61d5abe85d020087"
 )
-# Seconds and nanoseconds.
+# Seconds and nanoseconds of the first stamp.
 STAMP = (1_700_000_000, 123_456_789)
 PERIOD = 0.05
 
@@ -40,7 +40,7 @@ def header(sec, nanosec, frame):
 
 
 def transforms(entries):
-    """Entries are seconds, parent, child, x, y, z."""
+    """A message of transforms. Entries are seconds, parent, child, x, y, z."""
     types = STORE.types
     made = [
         types["geometry_msgs/msg/TransformStamped"](
@@ -57,7 +57,7 @@ def transforms(entries):
 
 
 def cloud(frame, little_endian, count=1000, wave=False):
-    """Point i is at (1 + i / 2, -i, i % 7), or on a wave as wide as long; and i + 0.25 bright, on ring i % 128."""
+    """Point i is at (1 + i / 2, -i, i % 7) or on a wavy square, with intensity i + 0.25 and ring i % 128."""
     order = "<" if little_endian else ">"
     kinds = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4"), ("ring", "u2")]
     offsets = [0, 4, 8, 16, 20]
@@ -70,7 +70,7 @@ def cloud(frame, little_endian, count=1000, wave=False):
     if wave:
         side = int(np.sqrt(count))
         points["x"], points["y"] = i % side / side * 20, i // side / side * 20
-        # Off the origin, where nothing would have been measured.
+        # Away from the origin, which would mean no return.
         points["z"] = np.sin(points["x"]) * np.cos(points["y"]) - 3
     points["intensity"], points["ring"] = i + 0.25, i % 128
 
@@ -96,13 +96,13 @@ def router(port):
     config.insert_json5("mode", '"router"')
     config.insert_json5("listen/endpoints", f'["tcp/127.0.0.1:{port}"]')
     config.insert_json5("scouting/multicast/enabled", "false")
-    # What is kept for whoever comes later has to have a time.
+    # Messages in the cache need a time stamp.
     config.insert_json5("timestamping/enabled", "true")
     return zenoh.open(config)
 
 
 def robot(session):
-    """Two sensors on a robot that moves, one of rmw_zenoh and one behind the bridge, each with its own transforms."""
+    """Two sensors on a moving robot, one with rmw_zenoh and one behind the bridge, each with its own transforms."""
     zid = session.info.zid()
     publishers, kept = [], []
     for place, (side, x, little_endian) in enumerate([("front", 1.0, True), ("rear", -1.0, False)]):
@@ -122,7 +122,7 @@ def robot(session):
                 topic = "%" + name.replace("/", "%")
                 token = f"@ros2_lv/0/{zid}/0/{place * 10 + number}/MP/%/%/lidar/{topic}/{kind}/::,:,:,:,,"
             kept.append(session.liveliness().declare_token(token))
-        # The robot is between two places when the points are measured.
+        # The points are measured at a time between two poses of the robot.
         moving = transforms([(STAMP[0] - 1, "odom", "base", 5.0, 20.0, 0.0), (STAMP[0] + 1, "odom", "base", 15.0, 20.0, 0.0)])
         publishers.append((session.declare_publisher(keys["tf"]), moving))
         points = cloud(f"{side}_lidar", little_endian)
@@ -137,29 +137,29 @@ def robot(session):
     print("publishing", flush=True)
     while not end.wait(PERIOD):
         for publisher, message in publishers:
-            # As rmw_zenoh: a number, a time and who sends it, which nobody has to read.
+            # The attachment of rmw_zenoh: number, time and sender, which receivers may ignore.
             publisher.put(message, attachment=time.time_ns().to_bytes(8, "little") * 4)
     for thing in kept:
         thing.undeclare()
 
 
 def sensor(session, count, seconds):
-    """One sensor that sends at a steady rate, as soon as somebody listens."""
+    """One sensor that sends at a constant rate once somebody listens."""
     message = bytearray(cloud("lidar", True, count, wave=True))
-    # Else the sender itself drops messages when the machine is busy.
+    # Without this, the sender itself drops messages on a busy machine.
     publisher = session.declare_publisher(f"0/points/{POINTS_KEY}", congestion_control=zenoh.CongestionControl.BLOCK)
     print("publishing", flush=True)
     while not publisher.matching_status.matching:
         time.sleep(0.01)
     begun, sent = time.monotonic(), 0
     while time.monotonic() - begun < seconds:
-        # The stamp follows the four bytes that begin a message.
+        # The stamp follows the four header bytes.
         sec, nanosec = divmod(time.time_ns(), 1_000_000_000)
         message[4:12] = sec.to_bytes(4, "little") + nanosec.to_bytes(4, "little")
         publisher.put(bytes(message))
         sent += 1
         time.sleep(max(0.0, begun + sent * PERIOD - time.monotonic()))
-    # What is on its way arrives.
+    # Messages on their way may still arrive.
     time.sleep(1)
     print(sent, flush=True)
 

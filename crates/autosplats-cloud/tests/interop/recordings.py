@@ -1,8 +1,8 @@
-"""Writes recordings by programs of others, and what points are in them: recordings.py FOLDER [SEED].
+"""Writes recordings with other programs, and describes their points: recordings.py FOLDER [SEED].
 
-Needs what requirements.txt beside it lists. Layouts are drawn by lot; the same seed makes the same ones. Beside each
-recording NAME stands NAME.json: for every frame its topic, stamp and columns in the common coordinate frame, null for what
-is no number, and for a recording with transforms the place of the sensor.
+Needs the packages of requirements.txt. Layouts are random; the same seed gives the same layouts. Each recording NAME has a
+NAME.json with topic, stamp and columns of every frame in the common coordinate frame, with null for NaN. For recordings
+with transforms the file also has the position of the sensor.
 """
 
 import json
@@ -21,7 +21,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 START = 1_700_000_000_000_000_000
 CLOUD = "sensor_msgs/msg/PointCloud2"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
-# Name and width of the types of PointField, in the order of their numbers.
+# Name and size of the types of PointField, in the order of their numbers.
 TYPES = ["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"]
 NAMES = ["a_i", "b_u", "gap", "line", "tag", "time", "speed", "echo"]
 
@@ -33,7 +33,7 @@ for store in [ros1, ros2]:
 
 
 def layout(rng, style):
-    """A numpy type of a point: fields in any order, anywhere, of any type."""
+    """A numpy type of a point, with fields in any order, at any offset, of any type."""
     if style == "packed":
         return np.dtype({"names": ["x", "y", "z"], "formats": ["<f4"] * 3, "offsets": [0, 4, 8], "itemsize": 12})
     order = ">" if style == "big" else "<"
@@ -53,7 +53,7 @@ def layout(rng, style):
 
 
 def points(rng, kind, count):
-    """Points of such a type, some of them no returns or no numbers."""
+    """Points of such a type, some of them no returns or NaN."""
     cloud = np.zeros(count, kind)
     for name in kind.names:
         base = kind[name].base
@@ -75,7 +75,7 @@ def points(rng, kind, count):
 
 
 def message(store, rng, cloud, height, stamp, frame):
-    """The cloud as a message, with gaps between rows if it has several."""
+    """The cloud as a message, with padding between rows if it has several."""
     header = store.types["std_msgs/msg/Header"]
     time = store.types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
     field = store.types["sensor_msgs/msg/PointField"]
@@ -121,7 +121,7 @@ def matrix(rotation, translation):
 
 
 def transforms(store, entries):
-    """Entries are stamp, parent, child, rotation, translation."""
+    """A message of transforms. Entries are stamp, parent, child, rotation, translation."""
     kind = store.types
     made = []
     for stamp, parent, child, rotation, translation in entries:
@@ -141,7 +141,7 @@ def transforms(store, entries):
 
 
 def expected(cloud, topic, stamp, pose):
-    """What the points are, as columns: those at zero left out, in the common frame."""
+    """Columns of the points in the common coordinate frame, without points at zero."""
     here = ~((cloud["x"] == 0) & (cloud["y"] == 0) & (cloud["z"] == 0))
     cloud = cloud[here]
     place = np.stack([cloud[axis].astype(float) for axis in "xyz"] + [np.ones(len(cloud))])
@@ -161,7 +161,7 @@ def expected(cloud, topic, stamp, pose):
 
 
 def recording(store, rng, styles, with_transforms):
-    """Messages of a recording (topic, type, time, message), and its frames as expected."""
+    """Messages of a recording (topic, type, time, message), and its expected frames."""
     messages, frames = [], []
     mounts = {}
     for index, _ in enumerate(styles):
@@ -180,7 +180,7 @@ def recording(store, rng, styles, with_transforms):
             cloud = points(rng, layout(rng, style), height * int(rng.integers(1, 60)))
             pose = np.eye(4)
             if with_transforms:
-                # Between two poses a turn about one axis goes evenly.
+                # Between two poses a rotation about one axis is uniform.
                 share = (stamp - START) / 10**8
                 robot = matrix(quaternion([0, 0, 1], 0.2 * share), [share * 1.5, 0.25 * share, 0])
                 pose = robot @ matrix(*mounts[index])
@@ -193,7 +193,7 @@ def recording(store, rng, styles, with_transforms):
 
 
 def write_mcap(path, store, messages, **options):
-    """By the mcap package; messages are made bytes by rosbags."""
+    """Writes with the mcap package; rosbags serializes the messages."""
     with open(path, "wb") as file:
         writer = McapWriter(file, chunk_size=8000, **options)
         writer.start()
@@ -218,7 +218,7 @@ def plain(value):
 
 
 def write_mcap_ros2(path, messages):
-    """By mcap-ros2-support, which has a CDR of its own."""
+    """Writes with mcap-ros2-support, which has its own CDR serializer."""
     with open(path, "wb") as file:
         writer = Ros2Writer(file, chunk_size=20_000, compression=CompressionType.LZ4)
         schemas = {}

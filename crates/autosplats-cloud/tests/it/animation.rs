@@ -1,4 +1,4 @@
-//! Points that move and are known at all times: sequences of files, glTF, scenes, and points strewn over them.
+//! Tests of animations: sequences of files, glTF, scenes, and points sampled on them.
 
 use std::{
     sync::{Arc, Mutex},
@@ -27,7 +27,7 @@ fn frame(animation: &Animation, frame: usize) -> Arc<PointCloud> {
     update(&mut stream).cloud
 }
 
-/// Keeps what is noted.
+/// Stores the notes.
 #[derive(Default)]
 struct Notes(Mutex<Vec<String>>);
 
@@ -167,7 +167,7 @@ fn strewn_points_stay_at_their_places_on_a_moving_mesh() {
         (0..20_000).map(|i| first.world_position(i).distance(to.world_position(i))).collect()
     };
     let largest = steps(&second).into_iter().fold(0.0, f64::max);
-    // A hoof moves by a tenth of the horse's 2.2 m; points that are not the same would be up to all of it apart.
+    // A hoof moves by a tenth of the horse's 2.2 m. Different samples would be up to 2.2 m apart.
     assert!(largest > 0.01 && largest < 0.4, "from frame to frame: {largest}");
     assert!(steps(&again).iter().all(|&step| step < 1e-3), "the gallop repeats after 24 frames");
 }
@@ -179,7 +179,7 @@ fn points_without_a_mesh_cannot_be_strewn() {
     assert!(matches!(drive.sampled(100, &()), Err(Error::NoSurface)), "sweeps of a lidar");
 }
 
-/// A triangle in a GLB whose first target raises a corner and whose node turns by half a turn, in one second.
+/// A GLB of a triangle. Within one second, its first target raises a corner, and its node rotates by 180°.
 fn moving_triangle(weights: &[f32]) -> Vec<u8> {
     let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let raised = [0.0_f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0];
@@ -231,10 +231,10 @@ fn a_gltf_changes_shape_and_turns() {
     let corner = |index: usize, corner: usize| frame(&moving, index).world_position(corner);
     let near = |is: DVec3, wanted: [f64; 3]| assert!(is.abs_diff_eq(DVec3::from(wanted), 1e-6), "{is}, not {wanted:?}");
     near(corner(0, 2), [5.0, 1.0, 0.0]);
-    // A quarter of the weight, which the file has between two times, and not turned yet.
+    // A quarter of the weight, stored between two times, and no rotation yet.
     near(corner(1, 2), [5.0, 1.0, 0.5]);
     near(corner(2, 2), [5.0, 1.0, 1.0]);
-    // Half way to half a turn about the z axis.
+    // Half of the rotation by 180° about the z axis.
     near(corner(3, 2), [4.0, 0.0, 1.5]);
     near(corner(3, 1), [5.0, 1.0, 0.0]);
     assert_eq!(
@@ -276,14 +276,14 @@ fn broken_animations_of_gltf_are_refused() {
     let at = whole.windows(4).rposition(|piece| piece == 1.0_f32.to_le_bytes()).unwrap();
     let ends: Vec<usize> = (0..=at).filter(|&i| whole[i..i + 4] == 1.0_f32.to_le_bytes()).collect();
     for end in ends {
-        // One of them is the time of the end: no value may ask for more than memory has.
+        // One of the changed values is the end time. No value may ask for more than the available memory.
         let _ = play(&[&whole[..end], &longest, &whole[end + 4..]].concat());
     }
 }
 
 #[test]
 fn a_small_gltf_cannot_keep_anyone_busy() {
-    // A thousand channels share numbers that take no bytes, and a thousand targets the vertices.
+    // A thousand channels share numbers that take no bytes, and a thousand targets share the vertices.
     let channels = [r#"{"sampler":0,"target":{"node":0,"path":"weights"}}"#; 1000].join(",");
     let targets = [r#"{"POSITION":0}"#; 1000].join(",");
     let count = 100_000;

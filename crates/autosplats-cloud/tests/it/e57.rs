@@ -1,4 +1,5 @@
-//! E57: real files must be what other programs say, made ones come back as they were, broken ones are told.
+//! Tests of E57: real files must match other programs, written files must come back unchanged, and broken files must be
+//! reported.
 
 use std::{
     path::Path,
@@ -13,7 +14,7 @@ use autosplats_cloud::{
     read_bytes, read_with, write,
 };
 
-/// Remembers the notes.
+/// Stores the notes.
 #[derive(Default)]
 struct Notes(Mutex<Vec<String>>);
 
@@ -72,7 +73,7 @@ fn real_files_are_what_others_say() {
 
 const EXACT: ReadOptions = ReadOptions { exact: true, keep_no_returns: false, columns: None, depth_camera: None };
 
-/// Writes a cloud and reads it back; the notes of writing.
+/// Writes a cloud and reads it back. Also returns the notes of writing.
 fn round_trip(cloud: &PointCloud, options: &ReadOptions) -> (PointCloud, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.e57");
@@ -99,7 +100,7 @@ fn real_files_come_back() {
         check_positions(file, &back, &cloud);
         assert_eq!((back.colors(), back.fields()), (cloud.colors(), cloud.fields()), "{file}: colours and fields");
         assert_eq!(back.crs(), cloud.crs(), "{file}: the coordinate system");
-        // Points of no scan come back as one.
+        // Points of no scan come back as one scan.
         assert!(cloud.scans().is_empty() || back.scans() == cloud.scans(), "{file}: scans");
         assert_eq!(notes, [""; 0], "{file}: nothing is lost");
     }
@@ -107,7 +108,7 @@ fn real_files_come_back() {
 
 #[test]
 fn fields_of_every_type_come_back() {
-    // More points than a packet holds, one, and none.
+    // More points than a packet holds, one point, and none.
     for count in [0, 1, 5, 20_000] {
         let mut random = Random(9);
         let mut values = |least: u64| (0..count).map(|_| random.next() >> 1 | least).collect::<Vec<u64>>();
@@ -124,7 +125,7 @@ fn fields_of_every_type_come_back() {
         assert_eq!(back.fields().len(), if count == 0 { back.fields().len() } else { cloud.fields().len() }, "{count}");
         for field in back.fields() {
             if field.name == "ReturnNumber" {
-                // One more than what is stored: 256 would be possible.
+                // E57 stores one less, so the value 256 is possible and the type is wider.
                 let same =
                     (0..count).all(|i| field.values.get(i) == cloud.field("ReturnNumber").unwrap().values.get(i));
                 assert!(same, "{count}: returns");
@@ -135,7 +136,7 @@ fn fields_of_every_type_come_back() {
     }
 }
 
-/// Two scans with poses, and points of none before, between and after them.
+/// Two scans with poses, and points of no scan before, between and after them.
 fn posed() -> PointCloud {
     let mut random = Random(7);
     let positions: Vec<[f32; 3]> =
@@ -173,7 +174,7 @@ fn poses_scans_and_wide_colours_come_back() {
     let cloud = posed();
     let (back, notes) = round_trip(&cloud, &EXACT);
     assert_eq!(notes, [""; 0], "nothing is lost");
-    // Points that no scan has come last.
+    // Points of no scan come last.
     let order: Vec<usize> = (10..40).chain(60..90).chain(0..10).chain(40..60).chain(90..100).collect();
     assert_eq!(back.len(), 100, "all points");
     for (i, &from) in order.iter().enumerate() {
@@ -308,7 +309,7 @@ fn coordinates_are_written_in_metres() {
     let points = vec![[0.0; 3], [0.01, 0.01, 30.0]];
     let cloud = PointCloud::new(DVec3::new(-94.0, 31.0, 5.0), points).with_crs(degrees);
     let (back, notes) = round_trip(&cloud, &exact);
-    // A hundredth of a degree at 31° north is 955 m to the east and 1108.7 m to the north.
+    // 0.01° at 31° north is 955 m to the east and 1108.7 m to the north.
     let size = back.world_position(1) - back.world_position(0);
     assert!((size - DVec3::new(955.2, 1108.7, 30.0)).abs().max_element() < 1.0, "{size}");
     assert!(notes.iter().any(|note| note.contains("degrees become metres")), "{notes:?}");
@@ -322,14 +323,14 @@ fn written(cloud: &PointCloud) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// CRC-32C bit by bit, so that a made file does not vouch for itself.
+/// CRC-32C bit by bit, independent of the code under test.
 fn checksum(data: &[u8]) -> [u8; 4] {
     let step = |crc: u32| if crc & 1 == 1 { crc >> 1 ^ 0x82f6_3b78 } else { crc >> 1 };
     let crc = data.iter().fold(u32::MAX, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| step(crc)));
     (!crc).to_be_bytes()
 }
 
-/// A file with something in its data replaced by as many bytes, checksums made anew.
+/// Replaces text in a file's data by text of the same length, and recomputes the checksums.
 fn changed(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
     let mut data: Vec<u8> = bytes.chunks(1024).flat_map(|page| &page[..1020]).copied().collect();
     let to = format!("{to:<width$}", width = from.len());
@@ -360,7 +361,7 @@ fn damage_costs_its_scan() {
     let bytes = written(&posed());
     let whole = changed(&bytes, "recordCount", "recordCount");
     assert!(whole == bytes, "the test's own checksums");
-    // The first scan is in pages 1 and 2, the second one in pages 2 to 4.
+    // The first scan is in pages 1 and 2, the second in pages 2 to 4.
     for (at, kept, name) in [(100, 70, "scan 1 'first'"), (2600, 70, "scan 2 'second")] {
         let mut damaged = bytes.clone();
         damaged[at] ^= 4;
@@ -401,7 +402,7 @@ fn claims_that_lie_are_refused() {
         let message = message(&lie);
         assert!(message.contains(words) && message.contains("a.e57: "), "{from} to {to}: {message}");
     }
-    // More points than there are values: those there are.
+    // More points claimed than values stored: the stored ones are read.
     let more = changed(&bytes, "recordCount=\"300\"", "recordCount=\"999\"");
     let notes = Notes::default();
     let cloud = read_bytes(Path::new("a.e57"), &more, &ReadOptions::default(), &notes).unwrap();
@@ -416,7 +417,7 @@ fn changes_that_checksums_do_not_tell() {
     let mut random = Random(11);
     for round in 0..1500 {
         let mut lie = data.clone();
-        // Headers of file and section, packets, and the XML section, which is the end.
+        // Headers of file and section, packets, and the XML section at the end.
         let [start, len] = [[0, 120], [48, 6000], [lie.len() - 7000, 7000]][round % 3];
         for _ in 0..=random.below(3) {
             let at = start + random.below(len);
@@ -436,7 +437,7 @@ fn changes_that_checksums_do_not_tell() {
     }
 }
 
-/// A file of this XML section, after so many bytes of data.
+/// A file with this XML section after `data`.
 fn file(data: &[u8], xml: &str) -> Vec<u8> {
     let mut all = b"ASTM-E57".to_vec();
     let len = (48 + data.len() + xml.len()).div_ceil(1020) as u64 * 1024;
@@ -463,7 +464,7 @@ fn constants_and_overlaps_take_no_memory() {
     data[0] = 1;
     data[8..16].copy_from_slice(&(32_u64 + 512).to_le_bytes());
     data[16..24].copy_from_slice(&80_u64.to_le_bytes());
-    // A packet of four streams, the last of which has 480 bytes.
+    // A packet of four streams, the last with 480 bytes.
     data.extend([1, 0, 0xff, 1, 4, 0, 0, 0, 0, 0, 0, 0, 0xe0, 1]);
     data.resize(32 + 512, 0x55);
     for count in ["350000000000", "18446744073709551615"] {
@@ -485,7 +486,7 @@ fn constants_and_overlaps_take_no_memory() {
     assert!(cloud.len() <= bytes.len(), "{} points of {} bytes", cloud.len(), bytes.len());
     let notes = notes.0.into_inner().unwrap().join("\n");
     assert!(notes.contains("overlap"), "{notes}");
-    // An element for every kind of attack on the parser of XML.
+    // One element per kind of attack on the XML parser.
     let wide = format!("<e57Root {}/>", (0..100_000).map(|i| format!("a{i}=\"\" ")).collect::<String>());
     assert!(message(&file(&[], &wide)).contains("a tag of"), "many attributes");
     let spaces = (0..50_000).map(|i| format!("<a xmlns:p{i}=\"u{i}\">")).collect::<String>();

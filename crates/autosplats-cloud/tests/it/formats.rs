@@ -1,4 +1,4 @@
-//! Every variant of every format, written here by hand and read back.
+//! Hand-made files of every variant of every format, read back.
 
 use std::sync::Mutex;
 
@@ -21,7 +21,7 @@ const THREE: [[f32; 3]; 3] = [[0.1, 0.2, 0.3], [-1.5, 2.25, 1e-7], [9000.0, -3.0
 fn ply_round_trip_keeps_every_bit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cloud.ply");
-    // More points than a block of the writer, and none.
+    // No point, one point, and more points than a block of the writer.
     for count in [0, 1, 300_000] {
         let cloud = rich_cloud(count);
         write(&cloud, &path, &()).unwrap();
@@ -83,7 +83,8 @@ fn a_failed_write_leaves_nothing() {
     assert!(matches!(read(&path, &Stop), Err(Error::Cancelled)), "reading is cancelled too");
 }
 
-/// The three points with a colour, a list and further elements around, in an encoding; types in either spelling.
+/// The three points with a colour, a list and further elements around them, in an encoding, with types in either
+/// spelling.
 fn ply(encoding: &str, newline: &str, spelled_out: bool) -> Vec<u8> {
     let name = |short: &'static str, long: &'static str| if spelled_out { long } else { short };
     let (float, uchar, int) = (name("float", "float32"), name("uchar", "uint8"), name("int", "int32"));
@@ -215,7 +216,7 @@ fn las_of_every_version_and_format() {
     let wide = [6, 7, 8, 9, 10].map(|format| ((1, 4), format));
     let (count, expected_positions, expected_colors) = (500, positions(500), colors(500));
     for (version, format) in cases.into_iter().chain(wide) {
-        // The compressor has no wave packets.
+        // The compressor does not support wave packets.
         for compressed in [false, true].into_iter().take(if matches!(format, 4 | 5 | 9 | 10) { 1 } else { 2 }) {
             let case = format!("LAS {version:?}, format {format}, compressed: {compressed}");
             let bytes = las_bytes(version, format, compressed, count);
@@ -224,7 +225,7 @@ fn las_of_every_version_and_format() {
             for (i, position) in expected_positions.iter().enumerate() {
                 let expected = DVec3::new(5e5, 5e6, 0.0) + DVec3::from(position.map(f64::from));
                 let error = (cloud.world_position(i) - expected).abs().max_element();
-                // Half a unit of the integers, and half an f32 step at 16.
+                // Half a unit of the integers, plus half an f32 step at 16.
                 assert!(error < 0.000_502, "{case}: point {i} is off by {error}");
             }
             let has_color = matches!(format, 2 | 3 | 5 | 7 | 8 | 10);
@@ -250,7 +251,7 @@ fn laz_equals_las() {
     }
 }
 
-/// A LAS 1.2 file of format 3, compressed in one way or another.
+/// A LAS 1.2 file of format 3, compressed in one of several ways.
 fn recompressed(las: &[u8], chunk_size: Option<u32>, in_chunks: bool) -> Vec<u8> {
     use std::io::{Cursor, Seek as _, SeekFrom};
 
@@ -290,7 +291,7 @@ fn recompressed(las: &[u8], chunk_size: Option<u32>, in_chunks: bool) -> Vec<u8>
     compressor.done().unwrap();
     let mut bytes = compressor.into_inner().into_inner();
     if !in_chunks {
-        // A single run has no offset of a chunk table before it.
+        // A single run of points has no offset of a chunk table before it.
         bytes.drain(start..start + 8);
     }
     bytes
@@ -298,7 +299,7 @@ fn recompressed(las: &[u8], chunk_size: Option<u32>, in_chunks: bool) -> Vec<u8>
 
 #[test]
 fn laz_in_chunks_of_every_kind() {
-    // The longer ones are decompressed piece by piece.
+    // The longer files are decompressed in blocks.
     let cases = [(50_000, Some(777), true), (50_000, None, true), (540_000, Some(700_000), true)];
     for (count, chunk_size, in_chunks) in cases.into_iter().chain([(540_000, Some(700_000), false)]) {
         let las = las_bytes((1, 2), 3, false, count);
@@ -329,7 +330,7 @@ fn pcd_of_every_encoding() {
         assert_eq!(cloud.colors().unwrap(), colors(5000), "{encoding}");
         let labels = (0..5000).map(|i| (i % 1000) as u16).collect();
         assert_eq!(cloud.field("label").unwrap().values, FieldValues::U16(labels), "{encoding}");
-        // Coloured, near and ahead of the origin: a depth camera's.
+        // Colours, and points near and in front of the origin, mean a depth camera.
         assert_eq!((cloud.axes(), cloud.fields().len()), (Some(Axes::Camera), 1), "{encoding}");
     }
 }
@@ -432,7 +433,7 @@ fn errors_name_place_and_remedy() {
     check("a.las", &las[..las.len() - 1999], &["first of 100 points", "copy"]);
 }
 
-/// Notes what is reported, and cancels once that has come so far.
+/// Stores the reported progress, and cancels once it reaches `stop_at`.
 struct Watch {
     stop_at: f32,
     reported: Mutex<Vec<f32>>,
@@ -456,7 +457,7 @@ fn progress_rises_and_cancelling_ends_the_work() {
     write(&rich_cloud(count), &path, &()).unwrap();
     let rows: String = positions(count).iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
     let header = "ply\nformat ascii 1.0\nelement vertex 600000\nproperty float x\nproperty float y\nproperty float z\n";
-    // A list before the vertices and one in them.
+    // A list before the vertices and one inside them.
     let mut lists =
         b"ply\nformat binary_little_endian 1.0\nelement face 100000\nproperty list uchar uchar a\n".to_vec();
     lists.extend(b"element vertex 100000\nproperty float x\nproperty float y\nproperty float z\n");

@@ -1,4 +1,4 @@
-//! glTF of every kind, written here by hand.
+//! Hand-made glTF files of every kind.
 
 use std::{path::Path, sync::Mutex};
 
@@ -18,7 +18,7 @@ impl Progress for Notes {
 /// The square and the point above it.
 const FIVE: [[f32; 3]; 5] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 1.0]];
 
-/// A glTF put together piece by piece: one buffer, a view and an accessor for each run of numbers.
+/// Builds a glTF piece by piece: one buffer, with a view and an accessor for each array.
 #[derive(Default)]
 struct Builder {
     buffer: Vec<u8>,
@@ -97,7 +97,7 @@ fn mesh(name: &str, bytes: &[u8]) -> (Contents, String) {
     mesh_at(&path)
 }
 
-/// One mesh of one primitive, shown as it is.
+/// One mesh with one primitive, without a transform.
 fn one(attributes: &str, more: &str) -> String {
     format!(
         "\"scene\":0,\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"mesh\":0}}],\
@@ -140,7 +140,7 @@ fn primitives_of_every_mode() {
 fn colours_become_srgb() {
     let mut builder = Builder::default();
     let position = builder.floats(&FIVE[..2]);
-    // Linear 1, 0.5, 0 and 0.2140, 0.0021, 1; sRGB of these by the standard's formula.
+    // Linear 1, 0.5, 0 and 0.2140, 0.0021, 1, and their sRGB values by the formula of the standard.
     let expected = [[255, 188, 0], [127, 7, 255]];
     let linear = [[1.0_f32, 0.5, 0.0], [0.214, 0.0021, 1.0]];
     let scaled = |largest: f32| linear.as_flattened().iter().map(move |value| (value * largest).round());
@@ -172,7 +172,7 @@ fn nodes_place_their_meshes() {
     let meshes = format!(
         "\"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":{position},\"NORMAL\":{normal}}},\"mode\":6}}]}}]"
     );
-    // Twice as large in y, turned by 90° about z, moved; below it a mirrored one, by a matrix.
+    // Scaled by 2 in y, rotated by 90° about z, and moved. Its child is mirrored by a matrix.
     let nodes = "\"nodes\":[{\"children\":[1]},\
         {\"mesh\":0,\"translation\":[500000,20,30],\"rotation\":[0,0,0.7071067811865476,0.7071067811865476],\
          \"scale\":[1,2,1],\"children\":[2]},\
@@ -190,7 +190,7 @@ fn nodes_place_their_meshes() {
     assert_eq!(both.triangles[..2], [[0, 1, 2], [0, 2, 3]], "as in the file");
     assert_eq!(both.triangles[3..5], [[5, 7, 6], [5, 8, 7]], "mirrored, so turned round");
     let component = |name: &str| both.cloud.field(name).unwrap().values.get(7);
-    // (0, 0.6, 0.8) with y halved is (0, 0.3, 0.8), then turned.
+    // (0, 0.6, 0.8) with y halved is (0, 0.3, 0.8), then rotated.
     let length = 0.3_f64.hypot(0.8);
     let expected = [-0.3 / length, 0.0, 0.8 / length];
     for (name, expected) in ["NormalX", "NormalY", "NormalZ"].into_iter().zip(expected) {
@@ -218,7 +218,7 @@ fn quantized_sparse_and_strided_values() {
     let normalized = builder.bytes(5122, "VEC3", 2, &i16s, ",\"normalized\":true");
     let plain = builder.bytes(5122, "VEC3", 2, &i16s, "");
     let u8s = builder.bytes(5121, "VEC3", 2, &[0, 1, 2, 253, 254, 255], "");
-    // Every second vector of a view of 24-byte steps, from its second number on.
+    // Every second vector of a view with steps of 24 bytes, from its second number on.
     let strided: Vec<u8> = (0..24_u8).flat_map(|i| f32::from(i).to_le_bytes()).collect();
     let view = builder.view(&strided, ",\"byteStride\":24");
     let strided = builder.accessor(5126, "VEC3", 4, &format!(",\"bufferView\":{view},\"byteOffset\":4"));
@@ -320,7 +320,7 @@ fn hostile_structures_are_refused() {
     let attributes = format!("\"POSITION\":{position}");
     let meshes = format!("\"meshes\":[{{\"primitives\":[{{\"attributes\":{{{attributes}}}}}]}}]");
     let scene = "\"scene\":0,\"scenes\":[{\"nodes\":[0]}]";
-    // A cycle, and a hundred thousand nodes in a row.
+    // A cycle, and a chain of a hundred thousand nodes.
     let cycle =
         builder.glb(&format!("{scene},\"nodes\":[{{\"mesh\":0,\"children\":[1]}},{{\"children\":[0]}}],{meshes}"));
     let (cycle, notes) = mesh("a.glb", &cycle);
@@ -328,11 +328,11 @@ fn hostile_structures_are_refused() {
     let chain: Vec<String> = (1..=100_000).map(|i| format!("{{\"children\":[{i}]}}")).collect();
     let chain = builder.glb(&format!("{scene},\"nodes\":[{},{{\"mesh\":0}}],{meshes}", chain.join(",")));
     assert_eq!(read_bytes("a.glb", &chain).unwrap().len(), 5, "a deep tree");
-    // Every node twice the child of the one before: two to the thousandth places, of which there is one.
+    // Every node is twice the child of the previous one: 2^1000 paths to one node.
     let twice: Vec<String> = (1..=1000).map(|i| format!("{{\"children\":[{i},{i}]}}")).collect();
     let twice = builder.glb(&format!("{scene},\"nodes\":[{},{{\"mesh\":0}}],{meshes}", twice.join(",")));
     assert_eq!(read_bytes("a.glb", &twice).unwrap().len(), 5, "an explosion of nodes");
-    // Many nodes that show one mesh of many points.
+    // Many nodes with one mesh of many points.
     let mut large = Builder::default();
     let position = large.floats(&[[0.0; 3]; 4000]);
     let primitive = format!("{{\"attributes\":{{\"POSITION\":{position}}}}}");
@@ -340,7 +340,7 @@ fn hostile_structures_are_refused() {
     let shown = format!("\"nodes\":[{nodes}],\"meshes\":[{{\"primitives\":[{primitive}]}}]");
     let message = error("a.glb", &large.glb(&shown));
     assert!(message.contains("16000000 points") && message.contains("split it"), "{message}");
-    // Points that are nowhere in the file.
+    // Points that are not in the file.
     for count in ["4000000000", "18446744073709551615"] {
         let mut zeros = Builder::default();
         zeros.view(&[0; 4], "");

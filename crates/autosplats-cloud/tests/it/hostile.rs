@@ -1,5 +1,5 @@
-//! Files cut at any place, with any bytes changed, and with headers that lie: an error or points, quickly, never a
-//! panic.
+//! Files cut anywhere, with changed bytes, and with false headers. Reading must quickly give an error or points, and
+//! never panic.
 
 use std::time::{Duration, Instant};
 
@@ -7,7 +7,7 @@ use crate::common::{Random, error, las_bytes, pcd_bytes, ptx_bytes, read_bytes, 
 use autosplats_cloud::{PointCloud, ReadOptions, describe, read, read_mesh, write};
 use base64::Engine as _;
 
-/// Far above what any of these small files takes, far below what a loop over a claimed count would.
+/// Far above the time for any of these small files, and far below that of a loop over a claimed count.
 const LIMIT: Duration = Duration::from_secs(5);
 
 const POINTS: usize = 300;
@@ -54,12 +54,12 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// A triangle of every three points in a row.
+/// A triangle from every three consecutive points.
 fn faces(word: &str, first: usize) -> impl Iterator<Item = String> {
     (first..first + POINTS - 2).map(move |i| format!("{word} {i} {} {}\n", i + 1, i + 2))
 }
 
-/// A hundred triangles that share no corner.
+/// A hundred triangles without shared corners.
 fn stl(text: bool) -> Vec<u8> {
     let positions = rich_cloud(POINTS).positions().to_vec();
     if text {
@@ -81,7 +81,7 @@ fn stl(text: bool) -> Vec<u8> {
     bytes
 }
 
-/// A triangle of every three points in a row, shown by the child of a node.
+/// A triangle from every three consecutive points, in the mesh of a child node.
 fn glb() -> Vec<u8> {
     let positions =
         rich_cloud(POINTS).positions().as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
@@ -121,7 +121,7 @@ fn mesh_ply() -> Vec<u8> {
     bytes
 }
 
-/// Reads what may be broken. A panic fails the test by itself; here time and sanity are checked.
+/// Reads a possibly broken file and checks time and plausibility. A panic fails the test by itself.
 fn survive(name: &str, what: &str, bytes: &[u8]) -> Option<PointCloud> {
     let start = Instant::now();
     let result = read_bytes(name, bytes);
@@ -142,7 +142,7 @@ fn survive(name: &str, what: &str, bytes: &[u8]) -> Option<PointCloud> {
     }
 }
 
-/// The same with triangles, and described. Triangles are no reason to be read where points are not.
+/// Reads the same bytes with triangles, and describes the file. A file without readable points must give no mesh.
 fn survive_as_mesh(name: &str, what: &str, bytes: &[u8], points: bool) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -175,10 +175,10 @@ fn files_cut_anywhere() {
         let body = (0..60).map(|i| bytes.len() * i / 60);
         for len in header.chain(body).chain(bytes.len() - 8..bytes.len()) {
             let cloud = survive(name, &format!("cut after {len} bytes"), &bytes[..len]);
-            // Bare rows do not say how many there should be; every other format does. The last line feed is no loss,
-            // nor is what LAZ has after its points, nor a digit of the last number. Of LAS the complete points are kept.
+            // Bare rows do not state their number; every other format does. Losing the last line feed, what follows the
+            // points in LAZ, or a digit of the last number is harmless. LAS keeps the complete points.
             let bare = matches!(name, "a.xyz" | "a.csv" | "a.obj");
-            // Faces come after the points; text of triangles is whole after any of them.
+            // Faces follow the points. Text of triangles is complete after any of them.
             let faces = matches!(name, "a.off" | "b.stl");
             let counted = !bare && !faces && len + 20 < bytes.len() && !name.contains(".la");
             assert!(!counted || cloud.is_none(), "{name}, cut after {len} of {} bytes: was read", bytes.len());
@@ -192,7 +192,7 @@ fn files_with_changed_bytes() {
     for (name, bytes) in samples() {
         for round in 0..400 {
             let mut changed = bytes.clone();
-            // Headers and the ends of files, where tables are, are worth more tries than coordinates.
+            // Headers and the ends of files, where tables are, deserve more tries than coordinates.
             let range = [bytes.len(), bytes.len().min(400), 60][round % 3];
             for _ in 0..=random.below(4) {
                 let at = if round % 3 == 2 { bytes.len() - 1 - random.below(range) } else { random.below(range) };
@@ -258,7 +258,7 @@ fn folders_and_missing_files_are_errors() {
     assert!(read(&folder.path().join("missing.ply"), &()).is_err(), "a missing file");
 }
 
-/// A file that was made here, compressed and then damaged, of whose times one switches between scanners for ever.
+/// A compressed and then damaged file whose GPS times switch between scanners forever.
 const SWITCHING: &str = "\
     TEFTRgAAEAAAAAAAAAAAAAAAAAAAAAAAAQQAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA\
     AAAAAAAAAAAAAHcB4QEAAAEAAACHJQAYAAAAGAAAAAAAAAAAAAAAAAAAAAAAAAD8qfHSTWJQP/yp8dJNYlA//Knx0k1iUD8AAAAAAAAAAAAAAAAA\

@@ -1,7 +1,7 @@
-//! Recordings that programs of others write, read here: `interop/recordings.py` makes them and says what is in them.
+//! Reads recordings written by other programs. `interop/recordings.py` writes them and describes their content.
 //!
-//! Ignored unless asked for, as it needs Python with what `interop/requirements.txt` lists. `cargo xtask peers` gets one, or:
-//! `AUTOSPLATS_PYTHON=python3 cargo test -p autosplats-cloud --test it interop:: -- --ignored`.
+//! Ignored by default, since the test needs Python with the packages of `interop/requirements.txt`. `cargo xtask peers`
+//! installs them, or run: `AUTOSPLATS_PYTHON=python3 cargo test -p autosplats-cloud --test it interop:: -- --ignored`.
 
 use std::{path::Path, process::Command, time::Duration};
 
@@ -53,7 +53,7 @@ fn check(path: &Path, expected: &Value) {
 
 fn check_points(what: &str, Update { cloud, .. }: &Update, frame: &Value) {
     let columns = frame["columns"].as_object().unwrap();
-    // Null stands for what is no number.
+    // Null stands for NaN.
     let column = |name: &str| -> Vec<f64> {
         columns[name].as_array().unwrap().iter().map(|value| value.as_f64().unwrap_or(f64::NAN)).collect()
     };
@@ -62,7 +62,7 @@ fn check_points(what: &str, Update { cloud, .. }: &Update, frame: &Value) {
     for index in 0..cloud.len() {
         let wanted = DVec3::from(xyz.each_ref().map(|axis| axis[index]));
         let found = cloud.world_position(index);
-        // Positions up to a hundred metres in f32, and all of one are NaN where one is.
+        // Positions up to a hundred metres in f32. If one coordinate is NaN, all are.
         let same = found.abs_diff_eq(wanted, 2e-5) || !found.is_finite() && !wanted.is_finite();
         assert!(same, "{what}, point {index}: {found} is not {wanted}");
     }

@@ -1,4 +1,4 @@
-//! The LAS family: what a record has, coordinate systems, descriptions, damage.
+//! Tests of the LAS family: contents of records, coordinate systems, descriptions, damage.
 
 use std::path::{Path, PathBuf};
 
@@ -72,7 +72,7 @@ fn extra_bytes_of_every_type() {
     };
     let expected = ["uint16 × 0.25 + 10", "float64", "int32 × 2", "uint16", "int32 × 0.5"];
     assert_eq!(["scaled", "type 10", "triple_1", "Intensity", "X"].map(stored), expected, "types as stored");
-    // What was read can be written: all types come back.
+    // Clouds that were read can be written: all types come back.
     for name in ["b.las", "b.laz"] {
         let (again, _) = load(&written(&cloud, name).0);
         for field in cloud.fields() {
@@ -143,7 +143,7 @@ fn colours_of_8_bits_in_16() {
         raw[20..].copy_from_slice(color.map(u16::to_le_bytes).as_flattened());
         raw
     };
-    // More than one run of points, the only large value in the last.
+    // More than one block of points, with the only large value in the last.
     let narrow: Vec<_> = (0..30_000).map(|i| point([i as u16 % 256, 255, 0])).collect();
     let (cloud, notes) = load(&file(2, 2, &[], &narrow));
     assert_eq!(cloud.colors().unwrap()[7], [7, 255, 0], "as they are");
@@ -168,7 +168,7 @@ fn what_is_left_of_broken_files() {
     assert!(told(&notes, "11 of 1000 points are lost"), "{notes:?}");
     assert!(told(&about(&las[..las.len() - 35]).notes, "998 of 1000"), "a description tells it, too");
 
-    // A chunk of three whose layers cannot be.
+    // A chunk of three with impossible layers.
     let laz = las_bytes((1, 4), 6, true, 120_000);
     let whole = load(&laz).0;
     let start = u32::from_le_bytes(laz[96..100].try_into().unwrap()) as usize + 8;
@@ -223,7 +223,7 @@ fn degrees_are_recognised_without_a_system() {
     assert!(notes.iter().any(|note| note.contains("look like degrees")), "{notes:?}");
     assert!(cloud.to_local_metres(), "so that they can be shown in metres");
     let size = cloud.world_position(1) - cloud.world_position(0);
-    // A hundredth of a degree at 31° north is 955 m to the east and 1108.7 m to the north.
+    // 0.01° at 31° north is 955 m to the east and 1108.7 m to the north.
     assert!((size - DVec3::new(955.2, 1108.7, 30.0)).abs().max_element() < 1.0, "{size}");
     bytes[179 + 32..179 + 40].copy_from_slice(&5.3_f64.to_le_bytes());
     assert_eq!(load(&bytes).0.crs(), &Crs::default(), "a flat box may be anything");
@@ -258,7 +258,7 @@ fn keys_say_what_text_of_a_horizontal_system_does_not() {
     }
 }
 
-/// The file, its format, coordinate system and what a note says of it.
+/// File, format, coordinate system, and text of the expected note.
 type Case = (&'static str, &'static str, Option<u32>, Option<&'static str>, Option<Unit>, Option<&'static str>);
 
 #[rustfmt::skip]
@@ -297,7 +297,7 @@ fn real_files_are_described() {
         let [low, high] = description.bounds.unwrap();
         for i in 0..cloud.len() {
             let (point, slack) = (cloud.world_position(i), description.resolution.unwrap() * 10.0);
-            // COPC headers here are exact where points were rounded to the scale.
+            // Headers of COPC are exact, while points are rounded to the scale.
             assert!(point.cmpge(low - slack).all() && point.cmple(high + slack).all(), "{file}: {point}");
         }
     }
@@ -321,7 +321,7 @@ fn degrees_of_a_real_file_become_metres() {
         let values = (0..cloud.len()).map(|i| cloud.world_position(i)[axis]);
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
     };
-    // 0.02283 degrees of longitude of 95.5 km and 0.0106 of latitude of 110.87 km.
+    // 0.02283° of longitude at 95.5 km per degree, and 0.0106° of latitude at 110.87 km.
     let size = [0, 1, 2].map(|axis| bounds(axis).1 - bounds(axis).0);
     assert!((size[0] - 2181.0).abs() < 5.0 && (size[1] - 1174.7).abs() < 3.0, "{size:?}");
     assert!((size[2] - 39.038).abs() < 0.01, "{size:?}");

@@ -1,4 +1,4 @@
-//! LAS as it is written.
+//! Tests of the LAS writer.
 
 use std::path::Path;
 
@@ -47,7 +47,7 @@ fn the_format_fits_the_fields() {
         assert_eq!(back.colors().unwrap()[1], [1, 2, 255], "colours in '{format}'");
         assert!(back.field("Red").is_none(), "bytes are all there is of them");
     }
-    // A place for whole numbers is no place for these.
+    // Integer fields cannot hold these values.
     let odd = cloud(&[
         ("Intensity", FieldValues::F32(vec![0.25, f32::NAN])),
         ("Classification", FieldValues::I32(vec![-1, 300])),
@@ -79,7 +79,7 @@ fn intensities_of_any_range_fill_their_place() {
         assert_eq!(scaled, !told.is_empty(), "{intensities:?}: {notes:?}");
         let exact = back.field("ExactIntensity").map(|field| format!("{:?}", field.values));
         assert_eq!(exact, scaled.then(|| format!("{intensities:?}")), "what scaling changes is kept as well");
-        // Once they are scaled, nothing is to be scaled again.
+        // Once values are scaled, nothing needs to be scaled again.
         let (again, _) = load(&written(&back, "a.las").0);
         assert_eq!(format!("{:?}", again.fields()), format!("{:?}", back.fields()), "and stays as it is");
     }
@@ -118,7 +118,7 @@ fn written_clouds_come_back() {
                 back.fields().iter().map(|f| &f.name).collect::<Vec<_>>()
             );
         }
-        // Twenty metres by three: a hundredth of a millimetre.
+        // Twenty metres by three: steps of a hundredth of a millimetre.
         let far = (0..cloud.len()).map(|i| (back.world_position(i) - cloud.world_position(i)).abs().max_element());
         assert!(far.fold(0.0, f64::max) < 0.51e-5, "{name}: positions are rounded to the step");
         assert!(notes.iter().any(|note| note.contains("rounded to steps of 0.00001")), "{notes:?}");
@@ -132,9 +132,9 @@ fn written_clouds_come_back() {
 
 #[test]
 fn moved_points_do_not_take_others_with_them() {
-    // Not at the corner, which is turned about.
+    // Not at the corner, which is the centre of the rotation.
     let steps = |i: usize| DVec3::new((1 + i * 37 % 1009) as f64, (i * 11 % 997) as f64, (i % 83) as f64) * 0.01;
-    // At multiples of the step, and at an odd place.
+    // At multiples of the step, and at an odd position.
     for corner in [DVec3::new(512_000.0, 5_400_000.0, 300.0), DVec3::new(512_000.003_7, 5_400_000.006_1, 300.0023)] {
         let place = |i: usize| corner + steps(i);
         let coarse = |i: usize| steps(i).as_vec3();
@@ -219,7 +219,7 @@ fn written_files_cut_and_changed() {
                 let at = random.below(range);
                 changed[at] = random.next() as u8;
             }
-            // Counts that lie are compared with the size by other tests; here it would only take time.
+            // Other tests compare false counts with the size; here they would only take time.
             changed[107..111].copy_from_slice(&bytes[107..111]);
             if bytes[25] == 4 {
                 changed[247..255].copy_from_slice(&bytes[247..255]);

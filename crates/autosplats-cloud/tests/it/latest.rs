@@ -1,4 +1,4 @@
-//! What is shown of streams: the newest, what is not too old, or everything.
+//! Tests of the points shown of streams: the newest, the recent, or all.
 
 use std::{sync::Arc, time::Duration};
 
@@ -9,7 +9,7 @@ use autosplats_cloud::{
 
 const MS: i64 = 1_000_000;
 
-/// An update of `count` points at a number of milliseconds, seen by a sensor.
+/// An update of `count` points at a time in milliseconds from one sensor.
 fn update(channel: usize, milliseconds: i64, count: usize) -> Update {
     let scan = Scan { name: Some(format!("{channel}")), world_from_sensor: DMat4::IDENTITY, points: 0..count };
     let cloud = PointCloud::new(DVec3::ZERO, vec![[1.0, 2.0, 3.0]; count]).with_scans(vec![scan]);
@@ -44,7 +44,7 @@ fn sensors_and_streams_are_merged_each_with_its_pose() {
     let second = latest.add(DMat4::from_translation(DVec3::X));
     latest.put(0, update(0, 100, 10));
     latest.put(0, update(1, 90, 20));
-    // Clocks of streams have nothing to do with each other.
+    // Clocks of different streams are independent.
     latest.put(second, update(0, -100_000, 30));
     let cloud = latest.cloud();
     assert_eq!(cloud.len(), 60, "all three");
@@ -113,7 +113,7 @@ fn a_clock_that_goes_back_a_little_is_followed_once_that_is_sure() {
         for time in [600, 700, 800] {
             latest.put(0, update(0, time, 1000));
         }
-        // As a simulation that is started again.
+        // A simulation that is started again.
         for (time, count) in [(0, 1), (100, 2), (200, 4)] {
             assert_eq!(latest.put(0, update(0, time, count)), late, "at {time}, {options:?}");
             assert!(latest.cloud().len() >= 1000, "it may have been overtaken");
@@ -132,14 +132,14 @@ fn messages_that_are_late_or_sent_twice_set_no_clock_back() {
     let decay = Some(Duration::from_millis(900));
     for options in [LatestOptions::default(), LatestOptions { decay, ..LatestOptions::default() }] {
         let mut latest = one(options.clone());
-        // Each second one is overtaken, three are held up together, one comes again and again.
+        // Every second one is overtaken, three are delayed together, and one repeats.
         for time in [100, 0, 300, 200, 500, 400, 900, 600, 700, 800, 1000, 950, 950, 950, 950, 950, 1100, 1100, 1050] {
             assert_ne!(latest.put(0, update(0, time, 1)), Arrival::Restarted, "at {time}, {options:?}");
         }
         let told = latest.statistics();
         assert_eq!((told.shown + told.late + told.duplicates, told.restarted), (19, 0), "{told:?}, {options:?}");
     }
-    // Where everything is kept, what comes late is shown and nothing has to go for it.
+    // With `accumulate`, late points are shown and remove nothing.
     let mut latest = one(LatestOptions { accumulate: true, ..LatestOptions::default() });
     for time in [500, 600, 0, 100, 200, 300, 400] {
         assert_eq!(latest.put(0, update(0, time, 1)), Arrival::Shown, "at {time}");
@@ -183,8 +183,8 @@ fn everything_is_kept_up_to_a_number_of_points() {
     assert_eq!(latest.cloud().len(), 5000 + 10, "the newest of each stays, however large");
 }
 
-/// Clouds are put together anew for each update, since whoever shows the last one still has it: what that costs, beside the 50 ms
-/// from update to update and what a picture of so many points takes.
+/// Measures the merging of clouds for each update, which happens anew because the last cloud is still shown. Compare
+/// with the 50 ms between updates and with the time of a picture of as many points.
 #[test]
 #[ignore = "a measurement; prints figures"]
 fn what_putting_together_takes() {
@@ -198,7 +198,7 @@ fn what_putting_together_takes() {
             let begun = std::time::Instant::now();
             let cloud = latest.cloud();
             times.push(begun.elapsed().as_secs_f64() * 1e3);
-            // What was shown is given up once the next one is there.
+            // The last cloud is released once the next one is there.
             before = cloud;
         }
         assert_eq!(before.len(), kept as usize * count, "all that is kept");

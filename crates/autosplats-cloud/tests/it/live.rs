@@ -1,4 +1,4 @@
-//! Points that come when they come: through a pipe, and in files that others write.
+//! Tests of live points: through a pipe, and in files that others write.
 
 use std::{
     io::Read,
@@ -12,10 +12,10 @@ use autosplats_cloud::{
     Error, Live, LiveOptions, Next, PointCloud, Progress, ReadOptions, Stream as _, Update, glam::DVec3, write,
 };
 
-/// Longer than anything here takes.
+/// Longer than any expected event takes.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A pipe: each piece sent is what one read gives.
+/// A pipe in which each sent piece is returned by one read.
 struct Pipe(Receiver<Vec<u8>>, Vec<u8>);
 
 impl Read for Pipe {
@@ -94,7 +94,7 @@ fn where_all_are_taken_the_writer_waits() {
             Err(_) => refusals += 1,
         }
         if lens.len() == 99 {
-            // All that is left is one that waits.
+            // Only the waiting one is left.
             break;
         }
     }
@@ -205,7 +205,7 @@ fn a_watched_file_is_read_each_time_it_was_written_and_is_whole() {
     assert_eq!(update(&mut live).cloud.len(), 10, "there it is");
     put(20, &path);
     assert_eq!(update(&mut live).cloud.len(), 20, "another in its place");
-    // In place, slowly: nothing is read before the end.
+    // Written slowly in place: nothing is read before the end.
     let other = folder.path().join("other.ply");
     put(3000, &other);
     let bytes = std::fs::read(&other).unwrap();
@@ -235,7 +235,7 @@ fn of_a_watched_folder_the_newest_file_is_shown() {
     std::fs::write(folder.path().join("notes.md"), "no cloud").unwrap();
     std::fs::write(folder.path().join(".frame_9.ply"), "hidden").unwrap();
     assert_eq!(live.next(Duration::from_millis(250), &()).unwrap(), Next::Nothing, "nothing to show");
-    // Written elsewhere, put there at once.
+    // Written elsewhere and then moved into place.
     let elsewhere = tempfile::tempdir_in(folder.path()).unwrap();
     for count in 6..=9 {
         put(count, &elsewhere.path().join(format!("{count}.ply")));
@@ -258,7 +258,7 @@ fn a_folder_that_fills_faster_than_it_is_looked_at_is_shown_nevertheless() {
     let lives = [folder.path(), &pattern].map(|path| Live::watch(path, &ReadOptions::default()).unwrap());
     let begun = Instant::now();
     let seconds = Duration::from_secs(3);
-    // Thirty a second, each put there at once; others of no such name beside them.
+    // Thirty per second, each moved into place, beside files with other names.
     let mut written = 0;
     while begun.elapsed() < seconds {
         written += 1;

@@ -1,4 +1,4 @@
-//! What writing, reading back and putting together must not lose, and what is told where it does.
+//! Tests of what writing, reading back and merging must keep, and of the notes about losses.
 
 use std::{
     sync::Mutex,
@@ -33,7 +33,7 @@ fn through(name: &str, cloud: &PointCloud) -> (Vec<String>, Vec<u8>, PointCloud)
     (notes.0.into_inner().unwrap(), std::fs::read(&path).unwrap(), back)
 }
 
-/// Colours of 16 bits that 8 cannot hold.
+/// 16-bit colours that 8 bits cannot hold.
 const WIDE: [[u16; 3]; 3] = [[65535, 0, 300], [1, 2, 3], [40000, 30000, 20000]];
 
 fn wide_cloud() -> PointCloud {
@@ -65,12 +65,12 @@ fn wide_colors_are_the_colors_of_a_file() {
 
 #[test]
 fn wide_colors_of_another_scale_are_no_colors() {
-    // As a cloud of which only dark points are left, whose 16-bit values look like 8-bit ones.
+    // A cloud with only its dark points left, whose 16-bit values look like 8-bit ones.
     let mut cloud = wide_cloud();
     cloud.retain(|i| i == 1);
     for name in ["a.ply", "a.las", "a.e57", "a.xyz"] {
         let back = through(name, &cloud).2;
-        // LAS leaves out what is zero for all points.
+        // LAS leaves out values that are zero for all points.
         assert_eq!(back.colors().unwrap_or(&[[0; 3]]), [[0; 3]], "{name}: still black");
     }
 }
@@ -93,7 +93,7 @@ fn losses_are_told() {
 
 #[test]
 fn a_mesh_keeps_the_corners_at_its_origin() {
-    // A cube of which every face has its own corners, as one with normals has.
+    // A cube whose faces have their own corners, as with normals.
     let corners = "0 0 0\n1 0 0\n1 1 0\n0 0 0\n0 1 0\n0 1 1\n";
     let xyz = "property float x\nproperty float y\nproperty float z\n";
     let mesh = format!(
@@ -145,7 +145,7 @@ fn normals_are_turned_with_their_points() {
     assert!(normal(3).abs_diff_eq(DVec3::Z * 0.5, 1e-6), "as long as before: {}", normal(3));
 }
 
-/// Far above what these take, far below what a loop over all scans for each point would.
+/// Far above what these tests take, and far below a loop over all scans for each point.
 const LIMIT: Duration = Duration::from_secs(5);
 
 #[test]

@@ -1,4 +1,5 @@
-//! The tests of the public interface, in one program: each further one is linked for itself, with all that the crate stands on.
+//! The tests of the public interface, in one program, since every further program is linked separately with all
+//! dependencies.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 

@@ -1,4 +1,4 @@
-//! Several clouds to one.
+//! Tests of merging several clouds.
 
 use crate::common::{colors, positions, rich_cloud};
 use autosplats_cloud::{

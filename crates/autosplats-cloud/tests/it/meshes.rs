@@ -1,11 +1,11 @@
-//! Meshes of every format: written here by hand, read back as points and as triangles.
+//! Hand-made meshes of every format, read back as points and as triangles.
 
 use std::{path::Path, sync::Mutex};
 
 use crate::common::{error, read_bytes};
 use autosplats_cloud::{Contents, Description, Progress, ReadOptions, describe, glam::DVec3, read_mesh};
 
-/// Keeps what the user is told.
+/// Stores the notes for the user.
 #[derive(Default)]
 struct Notes(Mutex<Vec<String>>);
 
@@ -29,7 +29,7 @@ fn with_file<T>(name: &str, bytes: &[u8], use_it: impl FnOnce(&Path) -> T) -> T 
     use_it(&path)
 }
 
-/// The mesh in `bytes` and what the user is told about it. Its points are those that reading without triangles gives.
+/// The mesh in `bytes` and the notes for the user. Its points must equal those read without triangles.
 fn mesh(name: &str, bytes: &[u8]) -> (Contents, String) {
     let notes = Notes::default();
     let mesh = with_file(name, bytes, |path| read_mesh(path, &ReadOptions::default(), &notes));
@@ -60,7 +60,7 @@ const FIVE: [[f32; 3]; 5] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], 
 /// The square and one face on it.
 const SQUARE_AND_FACE: [[u32; 3]; 3] = [[0, 1, 2], [0, 2, 3], [0, 1, 4]];
 
-/// Which elements a PLY has, and in what order.
+/// Elements of a PLY file, in order.
 #[derive(Clone, Copy, PartialEq)]
 enum Order {
     VerticesFirst,
@@ -115,7 +115,7 @@ fn ply(encoding: &str, order: Order) -> Vec<u8> {
         }
     };
     let put_faces = |bytes: &mut Vec<u8>| {
-        // A square, a face that is none, one that does not exist, a triangle.
+        // A square, an invalid face, a face with a missing corner, a triangle.
         for corners in [&[0, 1, 2, 3][..], &[0, 1], &[0, 1, 5], &[0, 1, 4]] {
             byte(bytes, 9);
             byte(bytes, 1);
@@ -127,7 +127,7 @@ fn ply(encoding: &str, order: Order) -> Vec<u8> {
         }
     };
     let put_strip = |bytes: &mut Vec<u8>| {
-        // Two strips; in the first one a point twice, to turn.
+        // Two strips. The first repeats a point, which reverses its orientation.
         let corners = [3, 0, 2, 1, 1, 4, -1, 0, 1, 4];
         int(bytes, corners.len() as i32);
         corners.into_iter().for_each(|corner| int(bytes, corner));
@@ -234,7 +234,7 @@ fn obj_colours() {
 
 #[test]
 fn long_obj_is_read_in_pieces() {
-    // Several pieces of half a megabyte, with relative corners across their borders, a face before its vertices, and a
+    // Several blocks of half a megabyte, with relative corners across their borders, a face before its vertices, and a
     // continued line wherever a border may be.
     let mut text = String::from("f 1 2 120000\n");
     for i in 0..120_000 {
@@ -340,7 +340,7 @@ fn text_stl(facets: &[[[f32; 3]; 3]]) -> String {
     format!("solid some name\n{}endsolid some name\n", facets.iter().map(facet).collect::<String>())
 }
 
-/// The facets of the five points, the first corner with a zero of the other sign.
+/// The facets of the five points. The first corner has a zero with the opposite sign.
 fn facets() -> Vec<[[f32; 3]; 3]> {
     let mut facets: Vec<_> =
         SQUARE_AND_FACE.iter().map(|corners| corners.map(|corner| FIVE[corner as usize])).collect();
@@ -385,7 +385,7 @@ fn stl_corners_are_welded() {
 
 #[test]
 fn many_stl_corners_are_welded_in_order() {
-    // A grid of squares, two triangles each, long enough for several threads.
+    // A grid of squares with two triangles each, long enough for several threads.
     let size = 200;
     let at = |x: usize, y: usize| [x as f32, y as f32, ((x * y) % 5) as f32];
     let mut facets = Vec::new();

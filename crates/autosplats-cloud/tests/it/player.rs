@@ -1,4 +1,4 @@
-//! What is seen of a stream at one moment.
+//! Tests of what is visible of a stream at one moment.
 
 use std::{
     collections::VecDeque,
@@ -14,7 +14,7 @@ use autosplats_cloud::{
     Statistics, Stream, Timeline, Update, glam::DVec3,
 };
 
-/// A folder of frames of three points each, the first of which lies as far to the right as the frame's number.
+/// A folder of frames with three points each. The x of the first point is the number of the frame.
 fn folder(frames: usize) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     for frame in 0..frames {
@@ -30,7 +30,7 @@ fn player(folder: &Path, latest: LatestOptions) -> Player {
     source.play(&play, &ReadOptions::default(), &()).expect("it can be played")
 }
 
-/// The frames that points are of, in order.
+/// The frames that the points belong to, sorted.
 fn frames(cloud: &PointCloud) -> Vec<i64> {
     let mut frames: Vec<i64> = (0..cloud.len()).map(|point| cloud.world_position(point).x as i64).collect();
     frames.sort_unstable();
@@ -62,7 +62,7 @@ fn a_frame_is_the_same_however_it_is_come_to() {
     }
 }
 
-/// Frames of two channels by turns, some of which cannot be read. The point of a frame is at its number.
+/// Frames of two channels in turn, some of them unreadable. The point of a frame is at the frame's number.
 struct Turns {
     timeline: Timeline,
     broken: Vec<usize>,
@@ -125,7 +125,7 @@ fn what_is_kept_is_seen() {
     assert_eq!(seen(accumulate, 5), [0, 1, 2, 3, 4, 5], "all");
 }
 
-/// Updates at these stamps, in milliseconds, one after the other.
+/// Updates with these stamps in milliseconds, one after the other.
 struct Stamps(VecDeque<i64>);
 
 impl Stream for Stamps {
@@ -159,7 +159,7 @@ fn what_became_of_updates_is_told() {
     assert_eq!((told.shown, told.late, told.duplicates, told.restarted), (5, 4, 1, 1), "{told:?}");
 }
 
-/// Gives a byte at a time, and takes its time for it.
+/// Gives one byte at a time, with a delay.
 struct Slow(VecDeque<u8>, Duration);
 
 impl Read for Slow {

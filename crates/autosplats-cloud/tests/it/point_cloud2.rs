@@ -1,4 +1,4 @@
-//! PointCloud2 messages of every layout, honest and not.
+//! Tests of PointCloud2 messages of every layout, valid and invalid.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn cloud(message: &Cloud2) -> PointCloud {
     decode(&message.cdr(), Encoding::Cdr).unwrap().cloud
 }
 
-/// What is wrong with a message that has to be refused, in one line that names the topic.
+/// The error of a message that must be refused: one line that names the topic.
 fn refusal(message: &Cloud2) -> String {
     let error = decode(&message.cdr(), Encoding::Cdr).unwrap_err().to_string();
     assert!(error.starts_with("/points: byte ") && !error.contains(char::is_control), "{error}");
@@ -48,12 +48,12 @@ fn points_of_any_step_are_found() {
     }
 }
 
-/// rerun's issue 12598: points all became the last one where z, y and x lay anywhere but at the beginning.
+/// rerun's issue 12598: all points equalled the last one if x, y and z were not at the beginning.
 #[test]
 fn fields_lie_in_any_order_and_anywhere() {
     let mut random = Random(5);
     for round in 0..200 {
-        // Each field at its own place in a point with gaps, in any order of the list, in either byte order.
+        // Each field at its own offset in a point with gaps, in any order of the list and either byte order.
         let sizes = [1, 1, 2, 2, 4, 4, 4, 8];
         let names = ["x", "y", "z", "a", "b", "c", "d", "e", "f", "g", "h"];
         let mut fields = Vec::new();
@@ -71,7 +71,7 @@ fn fields_lie_in_any_order_and_anywhere() {
         let point_step = offset + random.below(9) as u32;
         let row_step = point_step * width + random.below(2) as u32 * random.below(40) as u32;
         let mut data: Vec<u8> = (0..row_step * height).map(|_| random.next() as u8).collect();
-        // What is expected is written into the message.
+        // Writes the expected values into the message.
         let mut expected = Vec::new();
         for row in 0..height {
             for column in 0..width {
@@ -121,7 +121,7 @@ fn fields_lie_in_any_order_and_anywhere() {
                     "x" => cloud.world_position(index).x,
                     "y" => cloud.world_position(index).y,
                     "z" => cloud.world_position(index).z,
-                    // The library's name for what files call so.
+                    // The library's name for a field called `a` in files.
                     "a" => cloud.field("Alpha").unwrap().values.get(index),
                     name => cloud.field(name).unwrap_or_else(|| panic!("{name}, round {round}")).values.get(index),
                 };
@@ -266,7 +266,7 @@ fn messages_cut_or_changed_anywhere_do_no_harm() {
     for encoding in [Encoding::Ros1, Encoding::Cdr] {
         let bytes = message.message(encoding, false);
         for len in 0..bytes.len() {
-            // The last byte says whether all points are valid, which is not believed.
+            // The last byte states whether all points are valid, and is ignored.
             assert_eq!(decode(&bytes[..len], encoding).is_ok(), len == bytes.len() - 1, "cut after {len} bytes");
         }
         let mut random = Random(9);

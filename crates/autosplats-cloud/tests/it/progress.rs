@@ -1,4 +1,4 @@
-//! Reading that is watched: how far it is, what was noticed, points before the end, and an end when it is wanted.
+//! Observed reading: progress, notes, early points, and cancellation.
 
 use std::{
     path::{Path, PathBuf},
@@ -16,7 +16,7 @@ use autosplats_cloud::{
 /// Enough points for several chunks of every format.
 const POINTS: usize = 1_500_000;
 
-/// Remembers everything, and cancels at a look.
+/// Stores every report, and cancels at a given check.
 #[derive(Default)]
 struct Watcher {
     fractions: Mutex<Vec<f32>>,
@@ -49,7 +49,7 @@ impl Progress for Watcher {
     }
 }
 
-/// Files of formats that are read alone: text where the writers have bytes, lists, and meshes.
+/// Files of formats without a writer: other encodings, lists, and meshes.
 fn unwritten(folder: &Path, points: &[[f32; 3]]) -> Vec<PathBuf> {
     let count = points.len();
     let xyz = "property float x\nproperty float y\nproperty float z\nend_header\n";

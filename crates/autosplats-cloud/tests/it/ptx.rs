@@ -1,4 +1,4 @@
-//! PTX: scans with their poses, and what is no PTX.
+//! Tests of PTX: scans with poses, and files that are not PTX.
 
 use std::{path::Path, sync::Mutex};
 
@@ -9,7 +9,7 @@ use autosplats_cloud::{
     read_bytes,
 };
 
-/// Remembers the notes and the points handed out.
+/// Stores the notes and the early points.
 #[derive(Default)]
 struct Told {
     notes: Mutex<Vec<String>>,
@@ -38,7 +38,7 @@ fn load(text: &str, options: &ReadOptions) -> (PointCloud, Told) {
     (cloud.unwrap_or_else(|error| panic!("{error}")), told)
 }
 
-/// A quarter turn about z, and a place with survey coordinates.
+/// A quarter turn about z, and an origin in survey coordinates.
 const TURNED: &str =
     "500000.5 5400000.25 100\n0 1 0\n-1 0 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n500000.5 5400000.25 100 1\n";
 const PLAIN: &str = "1 2 3\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
@@ -76,7 +76,7 @@ fn scans_are_placed_turned_and_coloured() {
 fn nobody_stands_where_no_number_reaches() {
     let points = "1 0 0\n2 0 1\n";
     for (x, known) in [("5", true), ("1e300", false), ("-3e19", false)] {
-        // The points are told in world coordinates, the place apart.
+        // Only the position of the scanner is changed; the transform of the points is separate.
         let (cloud, told) = load(&format!("1\n2\n{}{points}", PLAIN.replacen('1', x, 1)), &ReadOptions::default());
         assert_eq!((cloud.len(), cloud.scans().len()), (2, usize::from(known)), "{x}");
         assert_eq!(told.notes.lock().unwrap().is_empty(), known, "{x}: told");

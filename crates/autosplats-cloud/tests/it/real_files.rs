@@ -1,8 +1,8 @@
-//! Real files, from a set shared by all who work on this and too large for the repository: counts and bounds must be
-//! those that other programs found, which the set's `README.md` lists.
+//! Real files from a shared set that is too large for the repository. Counts and bounds must be those found by other
+//! programs, as listed in the set's `README.md`.
 //!
-//! The set lies beside the repository, in `../shared/data`, or where `AUTOSPLATS_DATA` says. Without it these tests say
-//! that they check nothing, and where `CI` is set they fail.
+//! The set lies beside the repository in `../shared/data`, or where `AUTOSPLATS_DATA` points. Without the set these
+//! tests report that they check nothing, and fail if `CI` is set.
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,7 @@ fn bounds(clouds: &[PointCloud]) -> [DVec3; 2] {
         .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], point| [low.min(point), high.max(point)])
 }
 
-/// Asserts bounds that are known to seven digits.
+/// Asserts bounds known to seven digits.
 fn check_bounds(what: &str, clouds: &[PointCloud], low: [f64; 3], high: [f64; 3]) {
     let [found_low, found_high] = bounds(clouds);
     for axis in 0..3 {
@@ -32,7 +32,7 @@ fn check_bounds(what: &str, clouds: &[PointCloud], low: [f64; 3], high: [f64; 3]
     }
 }
 
-/// File, points, bounds, fields that must be there, whether there are colours.
+/// File, points, bounds, required fields, whether there are colours.
 type Case = (&'static str, usize, [f64; 3], [f64; 3], &'static [&'static str], bool);
 
 const LAS: &[&str] = &["Intensity", "ReturnNumber", "NumberOfReturns", "Classification", "PointSourceId", "GpsTime"];
@@ -92,7 +92,7 @@ fn sequences_are_what_others_say() {
     assert_eq!(counts(&samba), [9971; 30], "samba");
     check_bounds("samba", &samba, [-0.509918, 0.0198157, -0.643406], [0.774913, 1.79319, 0.495332]);
     let drive = all(folder.join("sequences/kitti_drive_pcd"), "pcd");
-    // One point of each is at the sensor itself: nothing came back.
+    // Each file has one point at the sensor itself, which means no return.
     assert_eq!(counts(&drive), [119_977, 118_702, 116_650, 115_650, 115_150], "drive");
     check_bounds("drive", &drive, [-79.719, -36.888, -28.347], [79.923, 43.326, 2.912]);
     let scans = all(folder.join("multiview/bunny_scans"), "ply");
@@ -121,7 +121,7 @@ fn particulars_of_real_files() {
     assert_eq!((range(&forest, "Intensity").1, range(&forest, "Classification")), (3004.0, (1.0, 65.0)), "values");
     assert_eq!(brightest(&forest), Some((65_024 >> 8) as u8), "true 16-bit colours");
 
-    // The same points, written by another program and compressed, and in a third format in other coordinates.
+    // The same points, written and compressed by another program, and in a third format in other coordinates.
     let compressed = load(&folder, "malformed/laz_two_padding_bytes.laz");
     assert_eq!((compressed.positions(), compressed.origin()), (simple.positions(), simple.origin()), "LAZ and LAS");
     assert_eq!((compressed.colors(), compressed.fields()), (simple.colors(), simple.fields()), "LAZ and LAS");
@@ -155,7 +155,7 @@ fn meshes_have_the_triangles_that_others_say() {
         assert_eq!(described.faces, Some(faces as u64), "{file}: described");
         assert_eq!(described.points, Some(mesh.cloud.len() as u64), "{file}: described");
     }
-    // A closed surface of V points has 2 V - 4 triangles, and each edge belongs to two of them, in opposite senses.
+    // A closed surface of V points has 2 V - 4 triangles. Two triangles share each edge, in opposite directions.
     let igea = mesh("models/igea.ply");
     assert_eq!(igea.triangles.len(), 2 * 134_345 - 4, "the strips of a closed surface");
     let mut edges: Vec<[u32; 2]> = igea.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
@@ -164,10 +164,10 @@ fn meshes_have_the_triangles_that_others_say() {
     edges.dedup();
     assert_eq!(edges.len(), count, "no edge twice in the same sense");
     assert!(edges.iter().all(|&[a, b]| edges.binary_search(&[b, a]).is_ok()), "each edge in the other sense too");
-    // Its bytes that were no UTF-8 are U+FFFD, as in the malformed files.
+    // Its bytes that were not UTF-8 are U+FFFD, as in the malformed files.
     let stork = folder.join("animation/stork_morph.glb");
     assert!(read(&stork, &()).is_err_and(|error| error.to_string().contains("UTF-8")), "the stork is destroyed");
-    // Two faces have an index beyond all vertices or none.
+    // Two faces have an index beyond all vertices, or no index.
     let cube = mesh("malformed/obj_malformed.obj");
     assert_eq!((cube.cloud.len(), cube.triangles.len()), (8, 8), "four of six squares");
 }
@@ -176,7 +176,7 @@ fn meshes_have_the_triangles_that_others_say() {
 fn malformed_files_are_told_or_read() {
     let Some(folder) = shared_data() else { return };
     let folder = folder.join("malformed");
-    // Points that can be vouched for, or words the error must contain.
+    // The number of certain points, or words that the error must contain.
     let expected: &[(&str, Result<usize, &str>)] = &[
         ("copc_fake.copc.laz", Err("header")),
         ("e57_corrupt_crc.e57", Err("checksum of page")),
@@ -246,7 +246,7 @@ fn sensors_stand_where_it_is_sure() {
         let found: Vec<_> = cloud.scans().iter().map(|scan| (scan.position(), scan.points.clone())).collect();
         assert_eq!(found, [(DVec3::ZERO, 0..cloud.len())], "{file}");
     }
-    // Models, merged clouds, and points that were moved into the coordinates of a survey.
+    // Models, merged clouds, and points moved into the coordinates of a survey.
     let unknown = [
         "scans/bunny_float.e57",
         "scans/rgb_float.e57",

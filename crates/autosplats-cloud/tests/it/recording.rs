@@ -1,4 +1,4 @@
-//! Recordings of robots: whole, cut off and damaged ones, with transforms and without, and real ones.
+//! Tests of recordings: whole, cut off, damaged and real ones, with and without transforms.
 
 use std::{path::Path, sync::Mutex, time::Duration};
 
@@ -18,7 +18,7 @@ use autosplats_cloud::{
 const START: i64 = 1_700_000_000_000_000_000;
 const SECOND: i64 = 1_000_000_000;
 
-/// Keeps what it is told.
+/// Stores the notes.
 #[derive(Default)]
 struct Notes {
     notes: Mutex<Vec<String>>,
@@ -50,7 +50,7 @@ fn open(name: &str, bytes: &[u8], options: &RecordingOptions) -> Result<(Recordi
     Ok((recording, notes.all()))
 }
 
-/// Plays to the end: updates and refusals.
+/// Plays to the end, and returns updates and refusals.
 fn play(recording: &mut Recording) -> (Vec<Update>, Vec<String>) {
     let (mut updates, mut refusals) = (Vec::new(), Vec::new());
     loop {
@@ -67,7 +67,7 @@ fn play(recording: &mut Recording) -> (Vec<Update>, Vec<String>) {
     }
 }
 
-/// The points of a frame: none is like another's.
+/// The points of a frame, different in each frame.
 fn points(frame: usize) -> Vec<[f32; 3]> {
     positions(40).iter().map(|[x, y, z]| [x + frame as f32, *y, *z]).collect()
 }
@@ -77,7 +77,7 @@ fn cloud(frame: usize, sensor: &str, encoding: Encoding) -> Vec<u8> {
     Cloud2 { stamp, frame: sensor.into(), ..Cloud2::xyz(&points(frame), 16) }.message(encoding, false)
 }
 
-/// Ten frames of one topic, a tenth of a second apart, with something else between them.
+/// Ten frames of one topic, a tenth of a second apart, with other messages between them.
 fn ten(encoding: Encoding) -> (Vec<Topic>, Vec<Message>) {
     let topics = vec![("/points", POINTS, encoding), ("/imu", "sensor_msgs/msg/Imu", encoding)];
     let time = |frame: usize| START + frame as i64 * SECOND / 10 + 5;
@@ -253,7 +253,7 @@ fn transforms_bring_the_points_into_one_frame() {
         let topics =
             vec![("/points", POINTS, encoding), ("/tf", TRANSFORMS, encoding), ("/tf_static", TRANSFORMS, encoding)];
         let fixed = transforms(encoding, &[(0, "/base", "lidar", [1.0, 0.0, 0.5], [0.0, 0.0, half, half])]);
-        // The robot drives along x at 10 m/s and turns by a quarter in a second; poses come once a second.
+        // The robot moves along x at 10 m/s and turns by 90° per second. Poses come once a second.
         let moving = |second: i64| {
             let angle = second as f64 * std::f64::consts::FRAC_PI_2;
             let [x, y, z, w] = DQuat::from_rotation_z(angle).to_array();
@@ -324,7 +324,7 @@ fn transforms_that_make_no_sense_do_no_harm() {
     let bad = transforms(
         encoding,
         &[
-            // A circle, frames in themselves, no rotations, no places.
+            // A cycle, frames that are their own parent, invalid rotations and translations.
             (START, "b", "a", [1.0; 3], turn),
             (START, "a", "b", [1.0; 3], turn),
             (START, "lidar", "lidar", [1.0; 3], turn),
@@ -385,7 +385,7 @@ fn damage_is_refused_and_the_rest_plays() {
     for compression in ["none", "lz4", "zstd"] {
         let good = mcap(&topics, &messages, Style { per_chunk: 4, ..Style::of(compression) });
         let mut bytes = good.clone();
-        // In the middle of the second chunk of five.
+        // In the middle of the second of five chunks.
         let at = bytes.len() * 3 / 10;
         bytes[at] ^= 0x55;
         let (mut recording, _) = open("a.mcap", &bytes, &RecordingOptions::default()).unwrap();
@@ -427,7 +427,7 @@ fn recordings_changed_anywhere_do_no_harm() {
 fn claims_of_gigabytes_are_not_believed() {
     let (topics, messages) = ten(Encoding::Cdr);
     let whole = mcap(&topics, &messages, Style::of("zstd"));
-    // Kind and length of the first chunk, behind the header; then times, and the size it claims unpacked.
+    // Kind and length of the first chunk, after the header; then times, and the claimed size after decompression.
     let chunk = (8..whole.len()).find(|&at| whole[at] == 6 && whole[at + 3..at + 9] == [0; 6]).unwrap();
     for (at, value) in [(1, u32::MAX.into()), (1, u64::MAX), (25, 1 << 32), (25, u64::MAX), (25, 1 << 20)] {
         let mut bytes = whole.clone();
@@ -486,7 +486,7 @@ fn real_recordings_of_both_kinds_are_the_same_points() {
     let Some(folder) = shared_data() else { return };
     let options = RecordingOptions { frame: Some("os1_lidar".into()), ..Default::default() };
     let mut of_kind = Vec::new();
-    // Only one of them has transforms.
+    // Only one of the files has transforms.
     for (name, frame) in [("ouster_ros1.mcap", Some("os1_sensor")), ("ouster_ros2_cdr.mcap", None)] {
         let path = folder.join("sequences").join(name);
         assert_eq!(describe_recording(&path, &()).unwrap().frame.as_deref(), frame, "{name}: the common frame");

@@ -1,4 +1,4 @@
-//! Points that come over Zenoh from another session in the same process.
+//! Tests of live points over Zenoh from another session in the same process.
 
 use std::{
     io::{BufRead as _, BufReader},
@@ -21,14 +21,14 @@ use autosplats_cloud::{
 };
 use zenoh::{Session, Wait as _, qos::CongestionControl};
 
-/// Long enough for anything that is going to happen.
+/// Longer than any expected event takes.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn live(port: u16, topic: &str) -> Remote {
     Remote::open(&format!("zenoh://127.0.0.1:{port}/{topic}"), &RemoteOptions::default()).unwrap()
 }
 
-/// Waits until the statistics say so.
+/// Waits until `holds` is true for the statistics.
 fn until(live: &Remote, what: &str, holds: impl Fn(&Statistics) -> bool) {
     let begin = Instant::now();
     while !holds(&live.statistics()) {
@@ -41,7 +41,7 @@ fn connected(live: &Remote) {
     until(live, "connected", |told| told.waiting.as_ref().is_none_or(|why| !why.starts_with("no router")));
 }
 
-/// The next points, while `send` sends again and again: what is sent before others heard of a subscription is lost.
+/// The next points, while `send` sends repeatedly. Messages sent before the subscription is known are lost.
 fn next(live: &mut Remote, send: impl Fn()) -> Update {
     let begin = Instant::now();
     while begin.elapsed() < PATIENCE {
@@ -54,7 +54,7 @@ fn next(live: &mut Remote, send: impl Fn()) -> Update {
 }
 
 fn put(session: &Session, key: &str, message: &[u8]) {
-    // Otherwise the sender itself drops messages when the machine is busy.
+    // Without this, the sender itself drops messages on a busy machine.
     session.put(key, message).congestion_control(CongestionControl::Block).wait().unwrap();
 }
 
@@ -116,7 +116,7 @@ fn the_newest_wins_and_the_others_are_counted() {
     let there = listener("peer", port);
     let mut live = live(port, "points");
     next(&mut live, || put(&there, "points", &Cloud2::xyz(&positions(1), 12).cdr()));
-    // What was sent again and again at the beginning.
+    // Drains the repeated messages from the beginning.
     while live.next(Duration::from_millis(300), &()).unwrap() != Next::Nothing {}
     let before = live.statistics();
     let message = |number: i64| Cloud2 { stamp: 1 + number, ..Cloud2::xyz(&positions(100_000), 24) }.cdr();
@@ -136,7 +136,7 @@ fn the_newest_wins_and_the_others_are_counted() {
     assert_eq!(live.next(Duration::ZERO, &()).unwrap(), Next::Nothing, "no queue behind it");
 }
 
-/// Bytes of memory that this process has.
+/// Resident memory of this process in bytes.
 fn resident() -> usize {
     let pages = std::fs::read_to_string("/proc/self/statm").ok();
     pages.and_then(|pages| pages.split(' ').nth(1)?.parse::<usize>().ok()).unwrap_or(0) * 4096
@@ -158,7 +158,7 @@ fn what_is_no_message_is_counted_and_survived() {
         let begin = Instant::now();
         while live.statistics().refused == before.refused && begin.elapsed() < PATIENCE {
             let next = live.next(Duration::from_millis(50), &()).unwrap();
-            // What was sent again and again at the beginning may still come.
+            // Repeated messages from the beginning may still arrive.
             assert!(!matches!(next, Next::Update(update) if update.cloud.len() != 10), "garbage became points");
         }
         let after = live.statistics();
@@ -256,7 +256,7 @@ fn several_topics_are_several_channels() {
         for (key, count) in &sent {
             put(&there, key, &message(*count));
         }
-        // Neither points nor declared as such.
+        // Topics that have no points and declare none.
         put(&there, "0/image/sensor_msgs::msg::dds_::Image_/RIHS01_00", b"an image");
         put(&there, "image", b"another");
         while let Next::Update(update) = live.next(Duration::from_millis(20), &()).unwrap() {
@@ -268,12 +268,12 @@ fn several_topics_are_several_channels() {
     assert_eq!(live.statistics().refused, 0, "what is not of points was never heard");
 }
 
-/// A frame within its parent, moved and not turned, as a message.
+/// A message with a frame that is translated but not rotated in its parent.
 fn transform(stamp: i64, parent: &str, child: &str, x: f64) -> Vec<u8> {
     transforms(Encoding::Cdr, &[(stamp, parent, child, [x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])])
 }
 
-/// One point at the sensor's (1, 2, 3).
+/// One point at (1, 2, 3) of the sensor's frame.
 fn one_point(stamp: i64) -> Vec<u8> {
     Cloud2 { stamp, ..Cloud2::xyz(&[[1.0, 2.0, 3.0]], 12) }.cdr()
 }
@@ -290,7 +290,7 @@ fn sensors_are_where_their_robot_says() {
         let port = free_port();
         let there = listener("peer", port);
         let mut live = live(port, "points");
-        // From one second to the next the robot goes from 10 to 20; the points are from between.
+        // The robot moves from 10 to 20 within a second. The points are from a time between.
         let sent = [
             (tf_static.clone(), transform(0, "base", "lidar", 100.0)),
             (tf.clone(), transform(NOW, "odom", "base", 10.0)),
@@ -301,7 +301,7 @@ fn sensors_are_where_their_robot_says() {
         assert_eq!(update.cloud.world_position(0), DVec3::new(113.5, 2.0, 3.0), "{points}");
         assert_eq!(update.cloud.scans()[0].position(), DVec3::new(112.5, 0.0, 0.0), "the sensor, {points}");
         assert_eq!((live.channels(), live.statistics().refused), (vec!["/points".into()], 0), "{points}");
-        // Later than all that is known of the robot; in order behind what is sent again and again.
+        // Later than all known transforms, and in order after the repeated messages.
         while live.next(Duration::from_millis(200), &()).unwrap() != Next::Nothing {}
         put(&there, &points, &one_point(NOW + 5 * SECOND));
         let Next::Update(update) = live.next(PATIENCE, &()).unwrap() else { panic!("nothing came") };
@@ -324,7 +324,7 @@ fn transforms_that_were_sent_before_anybody_listened_are_asked_for() {
     ] {
         let port = free_port();
         let there = listener("router", port);
-        // Two nodes, each of which says where one of two frames is.
+        // Two nodes, each with the transform of one of two frames.
         let nodes = [("base", "lidar", 10.0), ("map", "base", 20.0)].map(|(parent, child, x)| {
             let node = client(port);
             let token = rmw_token(&node, "tf_static", TRANSFORM, 7);
@@ -366,7 +366,7 @@ fn points_are_refused_until_the_frame_that_is_asked_for_is_known() {
     let why = place(&transform(NOW, "base", "lidar", 10.0)).unwrap_err();
     assert!(why.contains("no frame is called 'map'; there are: base, lidar"), "{why}");
     assert_eq!(place(&transform(NOW, "map", "base", 20.0)), Ok(31.0), "now there is");
-    // A robot that is put elsewhere; then its clock goes back, and only what it says from then on counts.
+    // The robot is moved. Then its clock goes back, and only transforms after that count.
     assert_eq!(place(&transform(NOW + SECOND, "map", "base", 50.0)), Ok(31.0), "later than the points");
     assert_eq!(place(&transform(NOW - 60 * SECOND, "map", "base", 70.0)), Ok(81.0), "the only one");
     assert_eq!(live.statistics().waiting, None, "and nothing is waited for");
@@ -427,7 +427,7 @@ fn topics_of_nobody_are_an_error_with_a_remedy() {
     assert!(Remote::open("zenoh://127.0.0.1", &RemoteOptions::default()).is_err(), "no topic is named");
 }
 
-/// A Python of which `rosbags` writes the messages and `eclipse-zenoh` sends them.
+/// A Python process in which `rosbags` writes the messages and `eclipse-zenoh` sends them.
 fn python(port: u16) -> Child {
     let python = std::env::var_os("AUTOSPLATS_PYTHON")
         .expect("AUTOSPLATS_PYTHON must name a Python that has eclipse-zenoh, rosbags and numpy");
@@ -482,7 +482,7 @@ fn points_of_another_implementation_arrive() {
         assert_eq!((stamp, cloud.len()), (1_700_000_000_123_456_789, 1000), "{topic}");
         let scan = &cloud.scans()[0];
         assert_eq!(scan.name.as_deref(), Some(frame), "{topic}");
-        // What is fixed was sent once, before anybody listened.
+        // Fixed transforms were sent once, before the subscription.
         let place = DVec3::new(10.0 + x, 20.0, 0.5);
         assert_eq!(scan.position(), place, "{topic}: where the robot says that its sensor is");
         let (light, ring) = (cloud.field("Intensity").unwrap(), cloud.field("Ring").unwrap());

@@ -1,4 +1,4 @@
-//! Points strewn over surfaces: how many, where, and how evenly.
+//! Tests of sampling on surfaces: number, position and evenness of points.
 
 use crate::common::Random;
 use autosplats_cloud::{
@@ -20,7 +20,7 @@ fn square() -> Contents {
     mesh(corners, vec![[0, 1, 2], [0, 2, 3]])
 }
 
-/// A unit square of `size`² small squares, two triangles each, in random order.
+/// A unit square of `size`² small squares with two triangles each, in random order.
 fn grid(size: u32) -> Contents {
     let at = |i: u32| [(i % (size + 1)) as f32 / size as f32, (i / (size + 1)) as f32 / size as f32, 0.0];
     let mut triangles: Vec<[u32; 3]> = (0..size * size)
@@ -38,7 +38,7 @@ fn grid(size: u32) -> Contents {
     mesh((0..(size + 1) * (size + 1)).map(at).collect(), triangles)
 }
 
-/// An octahedron blown up to a unit sphere, `4^levels` triangles to a face.
+/// An octahedron subdivided to a unit sphere, with `4^levels` triangles per face.
 fn sphere(levels: usize) -> Contents {
     let mut triangles = Vec::new();
     for signs in 0..8 {
@@ -78,7 +78,7 @@ fn area(mesh: &Contents, triangle: usize) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// Distance to a triangle, by its barycentric coordinates: infinite beyond its borders.
+/// Distance to a triangle; infinite beyond its borders.
 fn distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
     let normal = (b - a).cross(c - a);
     let slack = 1e-5 * (b - a).length().max((c - a).length());
@@ -88,7 +88,7 @@ fn distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
     if inside { normal.normalize().dot(point - a).abs() } else { f64::INFINITY }
 }
 
-/// Distances to the nearest other point, in mean distances of a random scatter of the same density, sorted.
+/// Sorted distances to the nearest other point, relative to the mean distance of random points of the same density.
 fn spacings(cloud: &PointCloud, area: f64) -> Vec<f64> {
     let points: Vec<Vec3> = cloud.positions().iter().map(|&point| Vec3::from(point)).collect();
     let unit = 0.5 * (area / points.len() as f64).sqrt();
@@ -133,11 +133,11 @@ fn as_many_points_on_a_triangle_as_its_area_says() {
     let mut chi_square = 0.0;
     for (found, area) in found.iter().zip(areas) {
         let expected = count as f64 * area / total;
-        // A patch more or less at either end of the triangle's part of the curve.
+        // One patch more or less at either end of the triangle's part of the curve.
         assert!((found - expected).abs() <= 2.0, "{found} points where {expected} are due");
         chi_square += (found - expected) * (found - expected) / expected.max(1.0);
     }
-    // Random points have 300 degrees of freedom, hence 300 ± 25.
+    // Random points would give 300 ± 25, with 300 degrees of freedom.
     assert!(chi_square < 100.0, "chi-square is {chi_square}");
 }
 
@@ -217,7 +217,7 @@ fn attributes_go_with_the_points() {
         assert!((value("y", i) - f64::from(*y)).abs() < 1e-5, "point {i}: y is {y}");
         let [red, green, blue] = cloud.colors().unwrap()[i];
         assert!((f32::from(red) - x * 200.0).abs() <= 1.5 && (green, blue) == (0, 255), "point {i}: {red} at {x}");
-        // The nearest by weight is within two thirds of a triangle.
+        // The corner with the largest weight is within two thirds of a triangle.
         assert!((value("Classification", i) / 10.0 - f64::from(*x)).abs() < 0.067, "point {i}: the class at {x}");
         let length = value("NormalX", i).hypot(value("NormalY", i));
         assert!((length - 1.0).abs() < 1e-5, "point {i}: a normal of length {length}");

@@ -1,4 +1,4 @@
-//! Simulated scanners, held against the surfaces that they look at.
+//! Compares simulated scanners with the surfaces that they scan.
 
 use std::{sync::Arc, time::Duration};
 
@@ -8,7 +8,7 @@ use autosplats_cloud::{
     glam::{DMat4, DVec3},
 };
 
-/// What all scanners see in a frame.
+/// The scans of all scanners in a frame.
 fn frame(animation: &Animation, frame: usize) -> Vec<Arc<PointCloud>> {
     let mut stream = animation.play();
     stream.seek(frame);
@@ -30,13 +30,13 @@ fn figure() -> (Scene, Animation) {
     (scene, animation)
 }
 
-/// The scanner that is placed first, with few rays and without faults.
+/// The first placed scanner, with few rays and without errors.
 fn exact(animation: &Animation) -> Scanner {
     let scanner = animation.scanners(1, &()).unwrap().remove(0);
     Scanner { columns: 160, rows: 120, noise: 0.0, ..scanner }
 }
 
-/// A square of 2 by 2 metres across the z axis, three metres before a sensor at the origin.
+/// A square of 2 m by 2 m across the z axis, three metres in front of a sensor at the origin.
 fn wall() -> Animation {
     let corners = [[-1.0, -1.0, 3.0], [1.0, -1.0, 3.0], [1.0, 1.0, 3.0], [-1.0, 1.0, 3.0]];
     let cloud = PointCloud::new(DVec3::ZERO, corners.to_vec()).with_colors(vec![[0; 3], [0; 3], [200; 3], [200; 3]]);
@@ -54,7 +54,7 @@ fn points_without_noise_are_the_first_that_rays_meet() {
     for index in (0..seen.len()).step_by(7) {
         let ray = seen.world_position(index) - eye;
         let hit = then.trace(eye, ray).unwrap();
-        // Positions have 24 bits, and a silhouette may be missed by that.
+        // Positions have 24 bits, so a ray may miss a silhouette by that.
         assert!(
             (hit.distance - ray.length()).abs() < 1e-4 || then.distance(seen.world_position(index)) < 1e-6,
             "{index}"
@@ -70,7 +70,7 @@ fn no_ray_that_meets_a_scene_is_left_out() {
         let (scene, count) = Scene::parse(name).unwrap();
         let animation = Animation::scene(&scene, count, 10.0).unwrap();
         let mut scanners = animation.scanners(2, &()).unwrap();
-        // One stands in the middle of it all and looks around.
+        // One scanner stands in the middle and looks around.
         let all_around = DMat4::from_translation(DVec3::new(0.1, 0.2, 1.7));
         scanners.push(Scanner { world_from_sensor: all_around, fov_degrees: [360.0, 170.0], ..Scanner::default() });
         for scanner in &mut scanners {
@@ -132,7 +132,7 @@ fn noise_dropouts_and_colours_are_as_asked_for() {
     let error = |i: usize| noisy.world_position(i).length() - all.world_position(i).length();
     let deviation = ((0..90_000).map(|i| error(i).powi(2)).sum::<f64>() / 90_000.0).sqrt();
     let mean = (0..90_000).map(error).sum::<f64>() / 90_000.0;
-    // Ninety thousand numbers tell a deviation to a quarter of a percent, a mean to a three hundredth of it.
+    // 90,000 values determine the deviation to a quarter of a percent, and the mean to 1/300 of the deviation.
     assert!((deviation - 0.02).abs() < 2e-4 && mean.abs() < 3e-4, "deviation {deviation}, mean {mean}");
     let across = |i: usize| noisy.world_position(i).normalize().dot(all.world_position(i).normalize());
     assert!((0..90_000).step_by(97).all(|i| across(i) > 1.0 - 1e-12), "along the rays alone");

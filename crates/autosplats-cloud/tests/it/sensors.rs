@@ -1,4 +1,4 @@
-//! What sensors leave: bare sweeps, depth images, PCD; made here, and real ones from the shared set.
+//! Tests of sensor files: bare sweeps, depth images, PCD; generated, and real ones from the shared set.
 
 use std::{
     path::Path,
@@ -72,7 +72,7 @@ fn too_few_columns_are_told() {
     assert!(says_itself(noted("a.ply", ply, &named("x,y,z")).unwrap().1), "PLY names its own");
 }
 
-/// Rows of floats: x y z, then intensity and ring as far as `columns` goes.
+/// Rows of floats: x y z, then intensity and ring as far as `columns` allows.
 fn sweep(count: usize, columns: usize) -> Vec<u8> {
     let mut random = Random(9);
     let rows = positions(count).into_iter().enumerate();
@@ -83,7 +83,7 @@ fn sweep(count: usize, columns: usize) -> Vec<u8> {
 #[test]
 fn sweeps_of_every_width() {
     for (columns, fields) in [(3, &[][..]), (4, &["Intensity"]), (5, &["Intensity", "Ring"])] {
-        // Divisible by every width: the values decide.
+        // Divisible by every width, so the values decide.
         let (cloud, notes) = noted("a.bin", &sweep(600, columns), &ReadOptions::default()).unwrap();
         assert_eq!((cloud.len(), names(&cloud), cloud.axes()), (600, fields.to_vec(), Some(Axes::ZUp)), "{columns}");
         assert_eq!(
@@ -133,7 +133,7 @@ fn other_files_are_no_sweeps() {
     assert!(error("a.bin", b"").contains("empty"), "nothing");
 }
 
-/// 16-bit grey, binary or as text; 3 columns, 2 rows.
+/// 16-bit grey, binary or as text, with 3 columns and 2 rows.
 fn pgm(ascii: bool) -> Vec<u8> {
     let depths = [0_u16, 1000, 2000, 500, 65535, 0];
     if ascii {
@@ -319,7 +319,7 @@ fn pcd_viewpoints_are_places_of_the_sensor() {
     assert!(notes[0].contains("i has 33 values"), "{notes:?}");
 }
 
-/// A text PCD of this width with these points.
+/// A text PCD of the given width with these points.
 fn pcd_image(width: usize, points: &[DVec3], viewpoint: &str) -> Vec<u8> {
     let (count, height) = (points.len(), points.len() / width);
     let mut text = format!(
@@ -332,7 +332,7 @@ fn pcd_image(width: usize, points: &[DVec3], viewpoint: &str) -> Vec<u8> {
 
 #[test]
 fn images_of_points_are_seen_from_the_origin_unless_they_were_moved() {
-    // A wall with a box before it, and holes.
+    // A wall with a box in front of it, and holes.
     let pixel = |i: usize| {
         let (u, v) = ((i % 40) as f64 - 19.5, (i / 40) as f64 - 14.5);
         let depth = if u.abs() < 8.0 && v.abs() < 8.0 { 2.0 } else { 5.0 + 0.1 * u };

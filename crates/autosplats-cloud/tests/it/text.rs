@@ -1,4 +1,4 @@
-//! Text points as programs write them: names, separators, decimal marks, gaps, and what is told of guesses.
+//! Points in text files as programs write them: names, separators, decimal marks, gaps, and notes about guesses.
 
 use std::{path::Path, sync::Mutex};
 
@@ -216,7 +216,7 @@ fn colours_of_every_depth() {
     let eight = |text: &str| noted("a.xyz", text).0.colors().unwrap().to_vec();
     assert_eq!(eight("1 2 3 0.5 1 0\n1 2 3 1 0 0.25\n"), [[128, 255, 0], [255, 0, 64]], "0 to 1");
     assert_eq!(eight("1 2 3 65535 256 0\n1 2 3 9 0 32768\n"), [[255, 1, 0], [0, 0, 128]], "16 bits");
-    // A late value beyond 255, after pieces that held bytes alone.
+    // A late value above 255, after blocks that hold only bytes.
     let rows = "1 2 3 9 8 255\n".repeat(300_000) + "1 2 3 65535 0 0\n";
     let colors = eight(&rows);
     assert_eq!((colors[0], colors[300_000]), ([0, 0, 0], [255, 0, 0]), "the largest value of all decides");
@@ -297,7 +297,7 @@ fn written_text_reads_back() {
             assert_eq!((back.positions(), back.colors()), (cloud.positions(), cloud.colors()), "{extension}, {count}");
             assert_eq!(names(&back), names(&cloud), "{extension}");
             for field in cloud.fields() {
-                // GpsTime is double, other fields come back as floats.
+                // GpsTime is double precision; other fields come back as floats.
                 let same = |i| back.field(&field.name).unwrap().values.get(i) == field.values.get(i);
                 let wide = |i: usize| field.values.get(i).abs() > f64::from(1 << 24) && count == 1;
                 assert!((0..count).all(|i| same(i) || wide(i)), "{extension}: {}", field.name);

@@ -1,4 +1,4 @@
-//! Points taken out and shaken.
+//! Tests of thinning and shuffling.
 
 use crate::common::{Random, positions, rich_cloud};
 use autosplats_cloud::{FieldValues, PointCloud, Scan, glam::DMat4, glam::DVec3};
@@ -21,13 +21,13 @@ fn attributes_and_scans_go_with_their_points() {
     }
 }
 
-/// The sensor of each point, by where it stood; none for points of no scan.
+/// Position of each point's sensor; `None` for points of no scan.
 fn sensors(cloud: &PointCloud) -> Vec<Option<DVec3>> {
     let of = |i: usize| cloud.scans().iter().find(|scan| scan.points.contains(&i)).map(Scan::position);
     (0..cloud.len()).map(of).collect()
 }
 
-/// Some scans, with gaps between them, and a field that numbers the sensors as the points have them.
+/// Some scans with gaps between them, and a field with the number of each point's sensor.
 fn scanned(random: &mut Random, count: usize) -> PointCloud {
     let mut scans = Vec::new();
     let mut start = 0;
@@ -45,7 +45,7 @@ fn scanned(random: &mut Random, count: usize) -> PointCloud {
     cloud.with_field("Sensor", FieldValues::F64(values)).unwrap()
 }
 
-/// Whether the sensor of each point is still its own, moved by `moved`.
+/// Whether each point still has its own sensor, moved by `moved`.
 fn keep_their_own(cloud: &PointCloud, moved: impl Fn(DVec3) -> DVec3) -> bool {
     let own = cloud.field("Sensor").unwrap();
     let back = |number: f64| moved(DVec3::new(number % 10.0, number / 10.0 % 10.0, number / 100.0).floor());
@@ -79,7 +79,7 @@ fn whatever_is_done_to_points_their_sensors_stay_their_own() {
                 3 => cloud.crop(cloud.origin() + shift - 9.0, cloud.origin() + shift + 9.0),
                 4 => cloud.add_noise(0.1, 3, &()).unwrap(),
                 _ => {
-                    // With others before and behind it, some of which know no sensor.
+                    // With other clouds before and after it, some without scans.
                     let pose = DMat4::from_translation(DVec3::new(1.0, 2.0, 3.0));
                     let none = PointCloud::new(cloud.origin(), positions(7));
                     let none = none.with_field("Sensor", FieldValues::F64(vec![f64::NAN; 7])).unwrap();
@@ -133,7 +133,7 @@ fn one_point_for_each_cube() {
     assert_eq!(cloud.len(), cubes(&whole).len(), "as many points as cubes");
     assert_eq!(cubes(&cloud), cubes(&whole), "and one in each");
 
-    // Of three points the middle one is nearest to their mean.
+    // The middle one of three points is nearest to their mean.
     let mut three = PointCloud::new(DVec3::ZERO, vec![[0.1; 3], [0.9; 3], [0.4; 3]]);
     three.thin_by_voxel(1.0, &()).unwrap();
     assert_eq!(three.positions(), [[0.4; 3]], "a measured point, not the mean");

@@ -1,10 +1,10 @@
-//! LAS files made by hand, and what is told of them.
+//! Hand-made LAS files, and the notes about them.
 
 use std::{path::Path, sync::Mutex};
 
 use autosplats_cloud::{Description, PointCloud, Progress, ReadOptions, describe_bytes, read_bytes, write};
 
-/// Keeps what readers and writers tell.
+/// Stores the notes of readers and writers.
 #[derive(Default)]
 pub(crate) struct Notes {
     pub(crate) notes: Mutex<Vec<String>>,
@@ -41,7 +41,7 @@ pub(crate) fn about(bytes: &[u8]) -> Description {
     describe_bytes(Path::new("a.las"), bytes, &EXACT).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Writes a cloud and gives back the bytes and what was noted.
+/// Writes a cloud, and returns the bytes and the notes.
 pub(crate) fn written(cloud: &PointCloud, name: &str) -> (Vec<u8>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -56,7 +56,7 @@ pub(crate) fn values(cloud: &PointCloud, name: &str) -> Vec<f64> {
     (0..cloud.len()).map(|i| field.values.get(i)).collect()
 }
 
-/// A LAS file made by hand: header, variable length records, point records.
+/// A hand-made LAS file: header, variable length records, point records.
 pub(crate) fn file(version: u8, format: u8, records: &[(&str, u16, Vec<u8>)], points: &[Vec<u8>]) -> Vec<u8> {
     let header = if version >= 4 { 375 } else { 227 };
     let mut vlrs = Vec::new();
@@ -95,7 +95,7 @@ pub(crate) fn file(version: u8, format: u8, records: &[(&str, u16, Vec<u8>)], po
     bytes
 }
 
-/// A description of an extra value.
+/// Descriptor of an extra value.
 pub(crate) fn extra(
     kind: u8,
     options: u8,

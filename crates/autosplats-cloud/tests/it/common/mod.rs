@@ -1,4 +1,4 @@
-//! What the tests of formats share: files in memory, and clouds and files to make.
+//! Shared by the tests of formats: files in memory, and generators of clouds and files.
 
 #![allow(dead_code, reason = "not every test uses all of it")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
@@ -16,7 +16,7 @@ pub(crate) mod zenoh_peer;
 
 use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, glam::DVec3, read};
 
-/// Reads `bytes` as a file of this name.
+/// Reads `bytes` as a file of the given name.
 pub(crate) fn read_bytes(name: &str, bytes: &[u8]) -> Result<PointCloud, Error> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -24,7 +24,7 @@ pub(crate) fn read_bytes(name: &str, bytes: &[u8]) -> Result<PointCloud, Error> 
     read(&path, &())
 }
 
-/// The folder of real files, if it is there; continuous integration must have it.
+/// The folder of real files, if present. In continuous integration it must be present.
 pub(crate) fn shared_data() -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from);
@@ -32,13 +32,13 @@ pub(crate) fn shared_data() -> Option<PathBuf> {
         return Some(folder);
     }
     assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
-    // Past the test harness, which would swallow what a passing test prints.
+    // Bypasses the test harness, which hides what a passing test prints.
     let message = format!("SKIPPED: the shared files are not at {}; nothing is checked\n", folder.display());
     std::io::stderr().write_all(message.as_bytes()).unwrap();
     None
 }
 
-/// The message of the error that reading `bytes` must give. It is one line and names the file.
+/// The error message that reading `bytes` must give: one line that names the file.
 pub(crate) fn error(name: &str, bytes: &[u8]) -> String {
     let message = match read_bytes(name, bytes) {
         Ok(cloud) => panic!("{name} was read: {} points", cloud.len()),
@@ -49,7 +49,7 @@ pub(crate) fn error(name: &str, bytes: &[u8]) -> String {
     message
 }
 
-/// Splitmix: numbers that are the same on every computer.
+/// SplitMix64: the same numbers on every computer.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -80,7 +80,7 @@ pub(crate) fn colors(count: usize) -> Vec<[u8; 3]> {
     (0..count).map(|_| [random.next() as u8, random.next() as u8, random.next() as u8]).collect()
 }
 
-/// A cloud with one of everything.
+/// A cloud with every kind of attribute.
 pub(crate) fn rich_cloud(count: usize) -> PointCloud {
     let mut random = Random(3);
     let mut values = || (0..count).map(|_| random.next()).collect::<Vec<_>>();
@@ -101,7 +101,7 @@ pub(crate) fn rich_cloud(count: usize) -> PointCloud {
     cloud.with_axes(Axes::YUp)
 }
 
-/// A LAS file, compressed if asked for, of any version and point format, as the `las` crate writes it.
+/// A LAS file of any version and point format from the `las` crate, optionally compressed.
 pub(crate) fn las_bytes(version: (u8, u8), format: u8, compressed: bool, count: usize) -> Vec<u8> {
     let mut builder = las::Builder::from(version);
     builder.point_format = las::point::Format::new(format).unwrap();

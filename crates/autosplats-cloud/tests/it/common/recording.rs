@@ -1,4 +1,4 @@
-//! Recordings, written by hand: MCAP and ROS 1 bags, closed or not, with or without what helps to read them.
+//! Hand-made recordings: MCAP files and ROS 1 bags, closed or not, with or without index records.
 
 use std::io::Write as _;
 
@@ -10,18 +10,18 @@ pub(crate) type Topic = (&'static str, &'static str, Encoding);
 pub(crate) const POINTS: &str = "sensor_msgs/msg/PointCloud2";
 pub(crate) const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 
-/// Which topic a message is of, when it was recorded, and its bytes.
+/// Index of a message's topic, time of recording, and bytes.
 pub(crate) type Message = (usize, i64, Vec<u8>);
 
-/// How a recording is written.
+/// Options of a recording.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Style {
-    /// `none`, `lz4`, `zstd` or `bz2`; of MCAP `loose` for no chunks at all.
+    /// `none`, `lz4`, `zstd` or `bz2`; for MCAP also `loose`, which means no chunks.
     pub(crate) compression: &'static str,
     pub(crate) per_chunk: usize,
-    /// Whether something behind each chunk says what is in it.
+    /// Whether index records follow each chunk.
     pub(crate) indexed: bool,
-    /// Whether it was closed: topics, and for MCAP the footer, stand at its end.
+    /// Whether the recording was closed: topics, and for MCAP the footer, are at the end.
     pub(crate) closed: bool,
 }
 
@@ -33,7 +33,7 @@ impl Style {
 
 fn compress(compression: &str, plain: &[u8]) -> Vec<u8> {
     match compression {
-        // As two frames, which count as one.
+        // Two frames, which together form the chunk.
         "zstd" => {
             let halves = <[&[u8]; 2]>::from(plain.split_at(plain.len() / 2));
             let level = || ruzstd::encoding::CompressionLevel::Fastest;
@@ -109,7 +109,7 @@ pub(crate) fn mcap(topics: &[Topic], messages: &[Message], style: Style) -> Vec<
     file
 }
 
-/// A record of a bag: named values, then data.
+/// A record of a bag: named fields, then data.
 fn bag_record(values: &[(&str, &[u8])], data: &[u8]) -> Vec<u8> {
     let field = |(name, value): &(&str, &[u8])| {
         let field = [name.as_bytes(), b"=", value].concat();

@@ -1,4 +1,4 @@
-//! ROS messages, written by hand.
+//! Hand-made ROS messages.
 
 use autosplats_cloud::point_cloud2::Encoding;
 
@@ -59,7 +59,7 @@ impl Writer {
     }
 }
 
-/// A PointCloud2 message; what it says need not be true.
+/// A PointCloud2 message, valid or not.
 #[derive(Clone)]
 pub(crate) struct Cloud2 {
     pub(crate) stamp: i64,
@@ -78,7 +78,7 @@ pub(crate) const F32: u8 = 7;
 pub(crate) const F64: u8 = 8;
 
 impl Cloud2 {
-    /// Points of x, y and z at the beginning of `step` bytes each.
+    /// Points with x, y and z at the beginning of `step` bytes each.
     pub(crate) fn xyz(positions: &[[f32; 3]], step: u32) -> Self {
         let gap = vec![0xee; step as usize - 12];
         let data = positions.iter().flat_map(|xyz| [xyz.map(f32::to_le_bytes).as_flattened(), &gap].concat()).collect();

@@ -1,25 +1,25 @@
-//! Others to connect to, in the same process.
+//! Zenoh sessions to connect to, in the same process.
 
 use std::net::TcpListener;
 
 use zenoh::{Config, Session, Wait as _, liveliness::LivelinessToken, query::Queryable};
 
-/// The type of transforms as rmw_zenoh writes it into keys.
+/// Type of transforms in the keys of rmw_zenoh.
 pub(crate) const TRANSFORM: &str = "tf2_msgs::msg::dds_::TFMessage_";
 
-/// The key of a topic as rmw_zenoh names it; the hash is any.
+/// Key of a topic in rmw_zenoh, with an arbitrary hash.
 pub(crate) fn rmw_key(domain: u32, topic: &str) -> String {
     format!("{domain}/{topic}/sensor_msgs::msg::dds_::PointCloud2_/RIHS01_{:x}", std::process::id())
 }
 
-/// A port of this machine that nobody uses.
+/// A free port of this machine.
 pub(crate) fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).unwrap().port()
 }
 
 fn open(mode: &str, way: &str, port: u16, calls: bool) -> Session {
     let mut config = Config::default();
-    // Who is called from the network has to be reached from there.
+    // A session that is found on the network must be reachable from there.
     let host = if calls { "0.0.0.0" } else { "127.0.0.1" };
     for (name, value) in [
         ("mode", format!("{mode:?}")),
@@ -32,17 +32,17 @@ fn open(mode: &str, way: &str, port: u16, calls: bool) -> Session {
     zenoh::open(config).wait().unwrap()
 }
 
-/// One that others connect to.
+/// A session that others connect to.
 pub(crate) fn listener(mode: &str, port: u16) -> Session {
     open(mode, "listen/endpoints", port, false)
 }
 
-/// One that answers who calls out on the network.
+/// A session that answers searches on the network.
 pub(crate) fn answering(port: u16) -> Session {
     open("peer", "listen/endpoints", port, true)
 }
 
-/// One that connects to another.
+/// A session that connects to another.
 pub(crate) fn client(port: u16) -> Session {
     open("client", "connect/endpoints", port, false)
 }
@@ -61,7 +61,7 @@ pub(crate) fn bridge_token(session: &Session, topic: &str) -> LivelinessToken {
     session.liveliness().declare_token(key).wait().unwrap()
 }
 
-/// Keeps a message for whoever comes later, under a key of its own, and answers with the key of the message.
+/// Stores a message under the key `asked` for later queries, and answers with the message's own key.
 pub(crate) fn cache(session: &Session, asked: String, key: String, message: Vec<u8>) -> Queryable<()> {
     let answer = move |query: zenoh::query::Query| query.reply(key.clone(), message.clone()).wait().unwrap();
     session.declare_queryable(asked).callback(answer).wait().unwrap()
