@@ -1,15 +1,13 @@
 //! Alignment of the timelines of several inputs on one common clock.
 //!
-//! Recordings made at the same time, for instance of several robots, are aligned by their stamps. All other inputs
-//! start when the clock starts.
+//! Recordings made at the same time, for instance of several robots, are aligned by their stamps. Others start at once.
 
 use std::time::Duration;
 
 /// Start of each input after the start of its group: the inputs whose recording times overlap, directly or through
 /// others. `None` for an input that overlaps with no other and starts with the clock.
 ///
-/// `spans` are the [clock spans](crate::Source::clock_span): first and last stamp in nanoseconds, or `None` for inputs
-/// without a shared clock.
+/// `spans` are the [clock spans](crate::Source::clock_span), in nanoseconds; `None` for inputs without a shared clock.
 pub fn beginnings(spans: &[Option<[i64; 2]>]) -> Vec<Option<Duration>> {
     let mut order: Vec<(usize, [i64; 2])> =
         spans.iter().enumerate().filter_map(|(number, span)| Some((number, (*span)?))).collect();

@@ -22,8 +22,7 @@ pub struct LatestOptions {
     pub decay: Option<Duration>,
     /// Keeps all earlier updates. Default false.
     pub accumulate: bool,
-    /// Maximum number of points to keep. The oldest updates are removed first, but never the newest of a sensor.
-    /// Default 100 million.
+    /// Maximum number of points to keep, beside the newest of each sensor. The oldest go first. Default 100 million.
     pub most_points: usize,
 }
 
@@ -38,8 +37,7 @@ impl Default for LatestOptions {
 pub enum Arrival {
     /// The update is shown.
     Shown,
-    /// The update is shown, and older updates of its sensor are removed, because the sensor's clock went back. A clock
-    /// went back if:
+    /// The update is shown, and older ones of its sensor are removed because its clock went back. This is so if:
     ///
     /// - the stamp is older than the newest by more than a second and more than `decay`, or
     /// - this is the fourth consecutive stamp that is older than the newest and newer than the one before.
@@ -69,8 +67,7 @@ pub struct LatestStatistics {
 
 /// Merges the updates of one or more streams, each with a pose, into the one cloud to show.
 ///
-/// Stamps are compared only within a sensor, because streams have separate clocks. Call [`restart`](Self::restart)
-/// after a seek or a replay.
+/// Stamps are compared only within a sensor. After a seek or a replay, call [`restart`](Self::restart).
 #[derive(Debug, Default)]
 pub struct Latest {
     options: LatestOptions,
@@ -191,8 +188,7 @@ impl Latest {
         self.merged = None;
     }
 
-    /// Starts a stream anew at the stamp of its next update, for instance after a seek. Until then its points stay
-    /// visible.
+    /// Starts a stream anew at its next update, for instance after a seek. Its points stay visible until then.
     pub fn restart(&mut self, stream: usize) {
         for (_, sensor) in self.sensors.iter_mut().filter(|(key, _)| key.0 == stream) {
             sensor.restarts = true;

@@ -68,14 +68,11 @@ pub struct PlayOptions {
     pub fps: Option<f64>,
     /// Topics of a recording to play; empty for all topics with points.
     pub topics: Vec<String>,
-    /// Coordinate frame that the points of a recording or of robots over Zenoh are transformed into. See
-    /// [`RecordingOptions::frame`].
+    /// Coordinate frame for the points of a recording or of robots over Zenoh. See [`RecordingOptions::frame`].
     pub frame: Option<String>,
-    /// Number of points sampled on a surface in place of the vertices of its mesh. Sources without a surface fail with
-    /// [`Error::NoSurface`].
+    /// Number of points to sample on the surface, in place of mesh vertices. [`Error::NoSurface`] if there is none.
     pub sample: Option<usize>,
-    /// Number of simulated scanners, at least 1, placed around the surface. Their points replace all others. Sources
-    /// without a surface fail with [`Error::NoSurface`].
+    /// Number of simulated scanners, at least 1, whose points replace all others. [`Error::NoSurface`] without surface.
     pub scanners: Option<usize>,
     /// Seed of the scanners' noise.
     pub seed: u64,
@@ -126,8 +123,7 @@ impl Source {
         }
     }
 
-    /// All files that currently belong to the source: the files of a sequence, of a recording's folder, and the images
-    /// that give depth images their colours.
+    /// All files that currently belong to the source, and the images that give depth images their colours.
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files = match self {
             Self::File(path) => vec![path.clone()],
@@ -164,9 +160,8 @@ impl Source {
         matches!(self, Self::Sequence(_) | Self::Recording(_) | Self::StandardInput | Self::Remote(_))
     }
 
-    /// The [span](Timeline::span) of the timeline on a clock shared with other sources, for
-    /// [`beginnings`](crate::beginnings). `None` except for recordings, since other stamps count from the start of
-    /// their own source.
+    /// The [span](Timeline::span) of the timeline of a recording, for [`beginnings`](crate::beginnings). `None` for
+    /// other sources, whose stamps share no clock.
     pub fn clock_span(&self, timeline: &Timeline) -> Option<[i64; 2]> {
         matches!(self, Self::Recording(_)).then(|| timeline.span()).flatten()
     }

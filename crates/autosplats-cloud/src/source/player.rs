@@ -22,8 +22,7 @@ const STEPS_BACK: usize = 16;
 ///
 /// - With [`decay`](LatestOptions::decay), if frames cannot be read or channels have different rates. Decay counts from
 ///   the newest update of each channel.
-/// - If more than 16 consecutive frames of a channel cannot be read. Only uninterrupted playback then still shows its
-///   last points.
+/// - If more than 16 frames of a channel in a row are unreadable. Only uninterrupted playback still shows its points.
 pub struct Player {
     stream: Box<dyn Stream>,
     options: LatestOptions,
@@ -45,8 +44,7 @@ impl Player {
         &*self.stream
     }
 
-    /// Outcomes of the updates that the stream returned. The stream's own [statistics](Stream::statistics) count what
-    /// it dropped or refused itself.
+    /// Outcomes of the updates returned by the stream. [`Stream::statistics`] counts what the stream refused itself.
     pub fn latest_statistics(&self) -> LatestStatistics {
         self.latest.statistics()
     }
@@ -91,8 +89,7 @@ impl Player {
 
     /// Reads a frame, and returns whether that succeeded.
     fn put(&mut self, frame: usize, progress: &dyn Progress) -> Result<bool, Error> {
-        // Uses the stamps of the timeline, made unique by the frame number. Stamps in messages may stand still or go
-        // back.
+        // Uses stamps of the timeline, made unique by the frame number. Stamps in messages may repeat or go back.
         let stamp = self.stream.timeline().and_then(|timeline| timeline.stamps().get(frame).copied());
         self.stream.seek(frame);
         for _ in 0..self.stream.updates_per_frame() {

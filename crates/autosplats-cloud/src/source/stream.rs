@@ -59,13 +59,12 @@ pub enum Next {
 /// The points of one sensor at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Update {
-    /// Number of the sensor within the stream, from 0. An update replaces the previous one of its channel and leaves
-    /// other channels alone.
+    /// Number of the sensor within the stream, from 0. An update replaces the previous one of its channel only.
     pub channel: usize,
     /// Time of measurement in nanoseconds: since 1970 for recordings, since the start for sequences.
     pub stamp: i64,
-    /// The points, in the stream's common coordinate frame. [Their scans](PointCloud::scans) hold the positions of the
-    /// sensor.
+    /// The points, in the stream's common coordinate frame. [Their scans](PointCloud::scans) hold the sensor's
+    /// positions.
     pub cloud: Arc<PointCloud>,
 }
 
@@ -131,8 +130,7 @@ impl Timeline {
         Some([*self.stamps.first()?, *self.stamps.last()?])
     }
 
-    /// Time from the start of the first frame to the end of the last, which lasts as long as the others on average.
-    /// Zero without frames.
+    /// Time from the first frame to the end of the last, which gets the average length. Zero without frames.
     pub fn duration(&self) -> Duration {
         let Some([first, last]) = self.span() else { return Duration::ZERO };
         let span = last.abs_diff(first);

@@ -127,8 +127,7 @@ impl<'a> Wire<'a> {
         Ok(String::from_utf8_lossy(text))
     }
 
-    /// Takes the length of a list whose items have at least `least` bytes each. Fails if the bytes left cannot hold the
-    /// list.
+    /// Takes the length of a list with items of at least `least` bytes. Fails if the bytes left cannot hold the list.
     pub(crate) fn list(&mut self, least: usize, what: &str) -> Result<usize, Fault> {
         let at = self.at;
         let len = self.u32(what)? as usize;

@@ -1,5 +1,4 @@
-//! Tests of E57: real files must match other programs, written files must come back unchanged, and broken files must be
-//! reported.
+//! Tests of E57: real files match other programs, written files come back unchanged, and broken files are reported.
 
 use std::{
     path::Path,

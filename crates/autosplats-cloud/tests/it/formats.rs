@@ -83,8 +83,7 @@ fn a_failed_write_leaves_nothing() {
     assert!(matches!(read(&path, &Stop), Err(Error::Cancelled)), "reading is cancelled too");
 }
 
-/// The three points with a colour, a list and further elements around them, in an encoding, with types in either
-/// spelling.
+/// The three points with a colour, a list and further elements, in an encoding, with types in either spelling.
 fn ply(encoding: &str, newline: &str, spelled_out: bool) -> Vec<u8> {
     let name = |short: &'static str, long: &'static str| if spelled_out { long } else { short };
     let (float, uchar, int) = (name("float", "float32"), name("uchar", "uint8"), name("int", "int32"));

@@ -1,5 +1,5 @@
-//! Files cut anywhere, with changed bytes, and with false headers. Reading must quickly give an error or points, and
-//! never panic.
+//! Files cut anywhere, with changed bytes, or with false headers. Reading quickly gives an error or points, without
+//! panic.
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,4 @@
-//! The tests of the public interface, in one program, since every further program is linked separately with all
-//! dependencies.
+//! The tests of the public interface, in one program, since every program is linked with all dependencies.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 

@@ -234,8 +234,8 @@ fn obj_colours() {
 
 #[test]
 fn long_obj_is_read_in_pieces() {
-    // Several blocks of half a megabyte, with relative corners across their borders, a face before its vertices, and a
-    // continued line wherever a border may be.
+    // Several blocks of half a megabyte. Relative corners cross their borders, a face precedes its vertices, and a
+    // continued line may lie on a border.
     let mut text = String::from("f 1 2 120000\n");
     for i in 0..120_000 {
         text += &format!("v {i} \\\n{}.5 -{i}\n", i % 7);

@@ -55,9 +55,8 @@ pub struct Animation {
 }
 
 impl Animation {
-    /// Plays the files of a folder, or the files that match a pattern like `scans/frame_*.ply`, as frames. Files may
-    /// have any of the [formats](crate::formats) and are sorted by the numbers in their names. `fps` is the number of
-    /// frames per second.
+    /// Plays the files of a folder, or the files that match a pattern like `scans/frame_*.ply`, at `fps` frames per
+    /// second. Files may have any of the [formats](crate::formats), and are sorted by the numbers in their names.
     ///
     /// Files that are not clouds are left out, with one note. So are files without a number in their name if others
     /// have one. A file without faces gets those of the first file if both have the same number of vertices.
@@ -68,8 +67,7 @@ impl Animation {
         Ok(Self { frames: Arc::new(sequence::Sequence::find(name, fps, options, progress)?) })
     }
 
-    /// Plays the first animation of a glTF, `fps` frames per second. Morph targets and the transforms of nodes are
-    /// animated; skins are not.
+    /// Plays the first animation of a glTF, `fps` frames per second. Morph targets and nodes move, skins do not.
     ///
     /// # Errors
     /// [`Error::NoFrames`] if nothing in the file moves, those of [`read`](crate::read), and [`Error::BadValue`].
@@ -90,8 +88,8 @@ impl Animation {
         Self { frames: Arc::new(still::Still::new(contents)) }
     }
 
-    /// Replaces the points by `count` points sampled on the surface. While a mesh keeps its faces, the samples keep
-    /// their places on it.
+    /// Replaces the points by `count` samples of the surface. They stay in place on a mesh while its faces are the
+    /// same.
     ///
     /// # Errors
     /// [`Error::NoSurface`] if the first frame has no surface, those of reading it, and [`Error::OutOfMemory`].
@@ -99,8 +97,7 @@ impl Animation {
         Ok(Self { frames: Arc::new(sampled::Sampled::new(Arc::clone(&self.frames), count, progress)?) })
     }
 
-    /// Replaces the points by those that `scanners` measure on the surface, one channel per scanner. The same `seed`
-    /// gives the same points.
+    /// Replaces the points by scans of the surface, one channel per scanner. The same `seed` gives the same scans.
     ///
     /// # Errors
     /// [`Error::BadValue`] for invalid properties of a scanner, and [`Error::OutOfMemory`]. An animation without a

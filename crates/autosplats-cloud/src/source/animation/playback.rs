@@ -18,8 +18,7 @@ const LOOK: Duration = Duration::from_millis(20);
 
 /// An [`Animation`](crate::Animation) that is played. While frames follow each other, the next one is read ahead.
 ///
-/// A frame that cannot be read returns an error once. After that it returns [`Next::Nothing`], and the points before it
-/// stay.
+/// A frame that cannot be read returns an error once, and then [`Next::Nothing`]. The points before it stay.
 pub struct Playback {
     frames: Arc<dyn Frames>,
     /// The frame to read next.

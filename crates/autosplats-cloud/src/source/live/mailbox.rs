@@ -32,8 +32,7 @@ struct State {
 }
 
 impl Mailbox {
-    /// Creates an empty mailbox. With `all`, writers wait until earlier updates are taken; otherwise new updates
-    /// replace them.
+    /// Creates an empty mailbox. With `all`, writers wait until earlier updates are taken; otherwise they replace them.
     pub(super) fn new(all: bool) -> Self {
         Self { all, state: Mutex::default(), changed: Condvar::new() }
     }

@@ -57,9 +57,9 @@ impl Live {
         Self::start(&name.clone(), options.all, move |mailbox| bytes::read(input, name.as_ref(), &options, mailbox))
     }
 
-    /// Watches a file, a folder, or a pattern like `scans/*.ply`. Gives the file each time it changes, or the newest
-    /// file of the folder or pattern, once it has not changed for a tenth of a second. The path need not exist yet.
-    /// Stamps are the times at which changes were noticed.
+    /// Watches a file, a folder, or a pattern like `scans/*.ply`, which need not exist yet. Gives the file each time it
+    /// changes, or the newest file of several. Files must not have changed for a tenth of a second. Stamps are the
+    /// times at which changes are noticed.
     ///
     /// # Errors
     /// [`Error::Io`] if no thread can be started.

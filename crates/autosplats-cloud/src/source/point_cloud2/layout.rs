@@ -86,8 +86,8 @@ impl<'a> Layout<'a> {
 
     /// The points without padding between rows.
     pub(super) fn rows(&self) -> Cow<'a, [u8]> {
-        // Writers often leave the row step at 0, or at its value before points were removed. A step that does not fit
-        // is ignored.
+        // Writers often leave the row step at 0, or at a value from before cropping. A step that does not fit is
+        // ignored.
         let end =
             self.height.saturating_sub(1).checked_mul(self.row_step).and_then(|start| start.checked_add(self.row));
         if self.row_step <= self.row || self.height < 2 || end.is_none_or(|end| end > self.data.len()) {
@@ -143,8 +143,7 @@ impl<'a> Field<'a> {
     }
 }
 
-/// The columns of the fields. Fails if a field exceeds a point of `step` bytes, or if all fields together are much
-/// larger than a point.
+/// The columns of the fields. Fails if a field exceeds a point of `step` bytes, or if fields overlap too much.
 fn columns(mut fields: Wire<'_>, number: usize, step: usize) -> Result<Vec<Column>, Fault> {
     let fields_at = fields.at();
     fields.list(LEAST_FIELD, "fields")?;

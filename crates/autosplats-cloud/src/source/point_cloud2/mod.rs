@@ -36,8 +36,7 @@ pub struct Message {
 /// Names of map frames, whose origin is not the position of a sensor.
 const MAPS: [&str; 5] = ["map", "odom", "world", "earth", "utm"];
 
-/// Converts a PointCloud2 message of any layout and byte order into a cloud. Rows of an organized cloud follow each
-/// other.
+/// Converts a PointCloud2 message of any layout and byte order into a cloud. Rows of an image follow each other.
 ///
 /// Values are named like those of files and become [`Field`](crate::Field)s. A field of several values becomes one per
 /// value, `name_0` and so on; fields of more than 16 values are left out. The points stay in the coordinate frame of

@@ -115,8 +115,7 @@ const CONVERT: &str =
 /// File that identifies the folder of a ROS 2 bag.
 const METADATA: &str = "metadata.yaml";
 
-/// Whether [`Recording::open`](super::Recording::open) can open a path: by the extension of a file, or by the content
-/// of a folder.
+/// Whether [`Recording::open`](super::Recording::open) can open a path, by the extension or the content of a folder.
 pub fn is_recording(path: &Path) -> bool {
     path.join(METADATA).is_file() || ["mcap", "bag", "db3"].iter().any(|extension| has_extension(path, extension))
 }

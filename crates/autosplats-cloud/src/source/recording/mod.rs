@@ -4,9 +4,8 @@
 //!
 //! A file is mapped, and its records are walked from front to end without unpacking chunks. Index records after each
 //! chunk tell which messages it contains, with their times. The result is an [`Index`](index::Index), the same for all
-//! containers. Chunks without index records, for instance in a file that is cut off, are unpacked to index them.
-//! Transforms between coordinate frames are read when the recording is opened. Points are read only when they are
-//! played, one message at a time.
+//! containers. Chunks without index records, as in a file that is cut off, are unpacked to index them. Opening reads
+//! all transforms between coordinate frames. Points are read only when they are played, one message at a time.
 
 mod bag;
 mod chunk;
@@ -72,8 +71,8 @@ pub struct Recording {
 impl Recording {
     /// Opens an MCAP file, a ROS 1 bag or the folder of a ROS 2 bag. Reads all transforms, but no points yet.
     ///
-    /// Parts that cannot be played, such as the end of a file that is cut off or a missing file of a folder, are
-    /// reported as [notes](Progress::note) and counted as [refused](Statistics::refused).
+    /// Parts that cannot be played, such as the missing end of a file, are reported as [notes](Progress::note) and
+    /// counted as [refused](Statistics::refused).
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Malformed`] if nothing can be played, [`Error::Unsupported`] if there are no points or

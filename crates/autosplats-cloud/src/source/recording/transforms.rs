@@ -125,8 +125,7 @@ impl Transforms {
         edge.poses.push_back((stamp, pose));
     }
 
-    /// Takes a live message, in any order. Keeps the poses of the last ten seconds of each frame. Starts anew if a
-    /// clock was set back.
+    /// Takes a live message, in any order. Keeps ten seconds of each frame, and restarts if a clock was set back.
     pub(in crate::source) fn hear(&mut self, message: &[u8], fixed: bool, arrival: i64) -> Result<(), String> {
         let samples = parse(message, Encoding::Cdr, arrival);
         let samples = samples.map_err(|fault| format!("{}: {}", fault.place(), fault.what))?;
@@ -148,8 +147,7 @@ impl Transforms {
         self.edges.contains_key(frame) || self.edges.values().any(|edge| edge.parent == frame)
     }
 
-    /// Chooses the frame to transform points into: `wanted`, or else the root above the first of the `sensors` that is
-    /// part of the tree.
+    /// Chooses the frame to transform points into: `wanted`, or else the root above the first sensor in the tree.
     pub(in crate::source) fn choose(&mut self, sensors: &[String], wanted: Option<String>) -> Result<(), String> {
         if let Some(wanted) = wanted {
             let known = self.frames(sensors);
@@ -233,8 +231,7 @@ impl Edge {
 
     /// Takes a live pose.
     fn hear(&mut self, fixed: bool, stamp: i64, pose: Pose) {
-        // As in recordings, a frame with both fixed and moving transforms counts as moving. Of several fixed transforms
-        // the last counts.
+        // As in recordings, a frame with fixed and moving transforms moves. Of several fixed ones the last counts.
         match (self.fixed, fixed) {
             (false, true) => return,
             (true, _) => self.poses.clear(),

@@ -77,17 +77,16 @@ impl Address {
         self.domain.map_or_else(|| "*".into(), |domain| domain.to_string())
     }
 
-    /// The keys to subscribe to for points of the topic: the key of rmw_zenoh, which includes the type, and that of the
-    /// bridge from DDS, which is the bare name. A pattern of bare names would match messages of all types. Such topics
-    /// are found through the declarations of their publishers instead.
+    /// The keys to subscribe to for points of the topic: that of rmw_zenoh with the type, and the bare name of the
+    /// bridge. A pattern of bare names would match messages of all types; declarations of publishers give those names.
     pub(super) fn keys(&self) -> Vec<String> {
         let Self { topic, .. } = self;
         let typed = format!("{}/{topic}/{POINTS}/*", self.domain_key());
         if self.is_pattern() { vec![typed] } else { vec![typed, topic.clone()] }
     }
 
-    /// The keys of transforms for the topic, in both forms: those beside the topic and those of all namespaces around
-    /// it, up to the first wildcard. Empty without a topic.
+    /// The keys of transforms for the topic, in both forms: beside the topic and in all namespaces around it, up to the
+    /// first wildcard. Empty without a topic.
     pub(super) fn transform_keys(&self) -> Vec<String> {
         let domain = self.domain_key();
         let named = |name: String| [format!("{domain}/{name}/{TRANSFORM}/*"), name];
@@ -95,9 +94,9 @@ impl Address {
         names.flat_map(named).collect()
     }
 
-    /// The keys to query for fixed transforms that were sent before the subscription, which ROS publishers keep. rmw_zenoh
-    /// and the bridge, from 1.3 on, keep them in the cache of Zenoh's advanced publisher. Older versions use a cache whose
-    /// queries have the session before the key, and the bridge adds a prefix of its own.
+    /// The keys to query for fixed transforms sent before the subscription, since ROS has publishers keep them.
+    /// `rmw_zenoh` and the bridge, from 1.3 on, use the cache of Zenoh's advanced publisher. Older versions use a cache
+    /// whose queries have the session before the key, and the bridge adds a prefix of its own.
     pub(super) fn history_keys(&self) -> Vec<String> {
         let domain = self.domain_key();
         let [_, fixed] = TRANSFORMS;

@@ -3,9 +3,8 @@
 //! # How it works
 //!
 //! Each robot, which is a ROS domain and a namespace in it, has its own tree of frames from the `tf` and `tf_static`
-//! published there. The common frame is chosen once, for the first points that arrive; a later change would make the
-//! points already shown jump. Transforms arrive in any order, so the first points wait a moment for them if anybody
-//! publishes transforms.
+//! published there. The common frame is chosen once, for the first points; a later change would make visible points
+//! jump. Transforms arrive in any order, so the first points wait a moment for them if they are published at all.
 
 use std::collections::BTreeMap;
 
@@ -54,8 +53,7 @@ impl Frames {
         heard
     }
 
-    /// Transform of points of a sensor measured at a time. `None` if no transforms concern the sensor. Fails if the
-    /// frame asked for is unknown.
+    /// Transform of a sensor's points at a time; `None` without transforms of it. Fails if the wanted frame is unknown.
     pub(super) fn placement(&mut self, topic: &Topic, frame: &str, stamp: i64) -> Result<Option<Placement>, String> {
         let Self { wanted, robots } = self;
         // The innermost namespace whose transforms know the sensor belongs to its robot.

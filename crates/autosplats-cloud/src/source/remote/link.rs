@@ -2,11 +2,11 @@
 //!
 //! # How it works
 //!
-//! Opening and closing wait for the network. A separate thread does both, so the caller that takes points never waits
-//! for the network. The thread retries until a connection is open; then Zenoh itself reconnects when the connection is
-//! lost. From then on the thread watches who is connected and subscribes to new topics of bridges. The thread also asks
-//! for transforms that were sent before the subscription: whenever others connect, and then at growing intervals, since
-//! a publisher may declare itself before it has transforms.
+//! Opening and closing wait for the network. A separate thread does both, so the caller that takes points never waits.
+//! The thread retries until a connection is open; then Zenoh itself reconnects when the connection is lost. From then
+//! on the thread watches who is connected and subscribes to new topics of bridges. It also asks for transforms sent
+//! before the subscription: when others connect, and then at growing intervals. A publisher may declare itself before
+//! it has transforms.
 
 use std::{
     collections::BTreeMap,

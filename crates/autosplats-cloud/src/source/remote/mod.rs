@@ -8,8 +8,7 @@
 //! themselves (`graph.rs`) explains why nothing arrives, if so. Robots publish transforms of their sensors
 //! (`frames.rs`), which bring all points into one coordinate frame, as in recordings.
 //!
-//! Zenoh is licensed under EPL-2.0 or Apache-2.0, at our choice. Zenoh asks for Rust 1.75, but its dependencies for
-//! 1.88.
+//! Zenoh is licensed under EPL-2.0 or Apache-2.0, at our choice. It asks for Rust 1.75, and its dependencies for 1.88.
 
 mod address;
 mod frames;
@@ -61,9 +60,8 @@ pub fn is_remote(name: &str) -> bool {
 
 /// Live points of ROS 2 over Zenoh.
 ///
-/// Each topic is a [channel](Update::channel), numbered in order of first messages. Stamps are those of the messages,
-/// or times of arrival for messages without a stamp. Messages are passed on as they arrive, even older ones after newer
-/// ones.
+/// Each topic is a [channel](Update::channel), numbered in order of first messages. Stamps come from the messages, or
+/// else from their arrival. Messages are passed on as they arrive, even older ones after newer ones.
 ///
 /// Transforms published as `tf` and `tf_static`, also in the namespaces around the topic, bring points into one
 /// coordinate frame. Poses are interpolated between transforms, and constant after the last one. Points of a sensor
@@ -72,8 +70,7 @@ pub struct Remote {
     address: Address,
     options: RemoteOptions,
     shared: Arc<Shared>,
-    /// Channels that have reported a note about points without a return, or about missing transforms. Each is reported
-    /// once.
+    /// Channels that have reported points without a return, or missing transforms. Each is reported once.
     told: Vec<[bool; 2]>,
 }
 

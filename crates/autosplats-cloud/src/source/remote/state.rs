@@ -1,5 +1,4 @@
-//! State shared by Zenoh's threads and the thread that takes points: the newest message of each channel, and the state
-//! of the connection.
+//! State shared by Zenoh's threads and the thread that takes points: newest messages, and the connection.
 
 use std::{
     sync::{Condvar, Mutex, MutexGuard, PoisonError},
@@ -41,8 +40,7 @@ pub(super) struct State {
     pub(super) graph: Graph,
     pub(super) frames: Frames,
     pub(super) connection: Connection,
-    /// The first channel whose points cannot be transformed into the frame asked for, and the reason. Set only until
-    /// other points can be.
+    /// First channel whose points cannot be transformed into the frame asked for, and why, until other points can be.
     pub(super) unplaced: Option<(usize, String)>,
     /// Time of the first message. `heard` is the time of the last.
     first: Option<Instant>,

@@ -13,8 +13,7 @@ use super::Scanner;
 /// Minimum number of rows per thread, and maximum number of bands of rows.
 const BAND: [usize; 2] = [16, 32];
 
-/// Margins of windows against rounding: a share of the angle between rays, an angle in radians, and a share of a ball's
-/// radius.
+/// Margins of windows against rounding: share of the angle between rays, angle in radians, share of a ball's radius.
 const SLACK: [f64; 3] = [1e-3, 1e-12, 1e-6];
 
 /// Rays from one place, at equal steps of azimuth and elevation.

@@ -30,8 +30,7 @@ pub(super) struct Hit {
 
 /// A target prepared for all rays of a scanner.
 pub(super) enum Sight<'a> {
-    /// For each ray the nearest and farthest distance at which it may hit something, if known. If far is less than
-    /// near, the ray hits nothing.
+    /// Nearest and farthest distance at which each ray may hit something, if known. Far is below near if none.
     Scene(&'a Scene, Option<Vec<[f32; 2]>>),
     Mesh(&'a Contents, &'a Triangles, Vec<Nearest>),
 }
@@ -118,8 +117,7 @@ impl Sight<'_> {
         }
     }
 
-    /// The hit of a ray for which [`may_meet`](Self::may_meet) holds. `direction` is the direction of the ray in the
-    /// scanner's frame.
+    /// The hit of a ray for which [`may_meet`](Self::may_meet) holds. `direction` is in the scanner's frame.
     pub(super) fn hit(&self, rays: &Rays, ray: usize, direction: DVec3) -> Option<Hit> {
         match self {
             Self::Scene(scene, spans) => {

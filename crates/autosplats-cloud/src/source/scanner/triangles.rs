@@ -93,13 +93,12 @@ impl Triangles {
     }
 }
 
-/// A triangle as seen from one scanner: products shared by all rays, so that most misses are found with a few dot
-/// products.
+/// A triangle as seen from one scanner. Products shared by all rays rule out most rays with a few dot products.
 #[derive(Clone, Copy)]
 struct Sides {
     index: u32,
-    /// Dot products of a ray's direction with `plane`, `second` and `third` tell whether the ray hits the plane of the
-    /// triangle, and the weights of its second and third corner there.
+    /// Where a ray meets the plane, the second and third corner have the weights `second` and `third` divided by
+    /// `plane`, each as a dot product with the ray's direction.
     plane: DVec3,
     second: DVec3,
     third: DVec3,

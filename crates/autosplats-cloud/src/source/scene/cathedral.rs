@@ -2,8 +2,8 @@
 //!
 //! # How it works
 //! The spaces are cut from a block of stone. The model has only one half bay of one side, and an end; folding space
-//! makes the rest. In the half bay, x goes from the middle of the window (0) to the column (3), then to the end of the
-//! building. y goes outward from the middle of the nave: column at 5, outer wall at 9.5. z is up, with the floor at 0.
+//! makes the rest. In the half bay, x goes from the window's middle at 0 to the column at 3, then to the building's
+//! end. y goes outward from the nave's middle, with the column at 5 and the outer wall at 9.5. z is up, from the floor.
 
 use std::f64::consts::FRAC_PI_2;
 

@@ -48,8 +48,7 @@ pub(super) enum Gait {
     Gallop(f64),
 }
 
-/// Adds a horse as separate groups: 1.6 m high at the withers, hooves on z = 0, facing x. Returns the top of its head
-/// in world coordinates.
+/// Adds a horse as separate groups: 1.6 m high at the withers, hooves on z = 0, facing x. Returns the top of its head.
 pub(super) fn horse(body: &mut Body, gait: Gait, coat: Coat) -> DVec3 {
     let stride = match gait {
         Gait::Standing => 0.0,

@@ -147,7 +147,7 @@ impl Scene {
         })
     }
 
-    /// Samples `count` coloured points on the surface. `progress` gets the completed fraction, 0 to 1, from any thread,
+    /// Samples `count` coloured points on the surface. `progress` gets the completed share, 0 to 1, from any thread,
     /// and cancels by returning false.
     ///
     /// # Errors

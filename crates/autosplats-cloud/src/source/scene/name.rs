@@ -95,8 +95,7 @@ fn known() -> String {
     Kind::ALL.map(|kind| format!("\n  {:<11} {}", kind.name(), kind.about())).concat()
 }
 
-/// Parses a number of points as people type it: `1000`, `546K`, `1.5M`, `1g`. `None` if the text is not a number from 1
-/// to 1G.
+/// Parses a number of points: `1000`, `546K`, `1.5M`, `1g`. `None` if the text is not a number from 1 to 1G.
 pub fn parse_count(text: &str) -> Option<usize> {
     let text = text.trim();
     let (number, unit) = match text.char_indices().last()? {

@@ -1,10 +1,10 @@
 //! Cells of space with the solids that matter in each, and rays through the cells.
 //!
 //! # How it works
-//! If the centre of a cell is farther from the surface than from its corners, the cell is empty and a ray crosses it in
-//! one step. Every other cell is cut into eight, each with the shorter list of solids that still matter in it, until
-//! the list is short or the cell is small. In such a cell a ray advances by the distance bound until the sign changes.
-//! Regula falsi then refines the root.
+//! A cell is empty if its centre is farther from the surface than from its corners. A ray crosses it in one step. Every
+//! other cell is cut into eight, each with the shorter list of solids that matter in it. Cutting ends when the list is
+//! short or the cell is small. There a ray advances by the distance bound until the sign changes. Regula falsi then
+//! refines the root.
 
 use std::ops::Range;
 
@@ -52,8 +52,7 @@ pub(super) struct Octree {
     depth: u32,
     cells: Vec<Cell>,
     lists: Vec<u16>,
-    /// For each cube of level [`TOP`], ordered by z, y, x: the deepest cell that contains the cube, and the level of
-    /// that cell.
+    /// Deepest cell that contains each cube of level [`TOP`], ordered by z, y, x, and the level of that cell.
     top: Vec<(u32, u32)>,
 }
 
@@ -253,8 +252,8 @@ impl Octree {
         (0..8).filter(near).fold(0, |bits, i| bits | 1 << i)
     }
 
-    /// Calls `hit` with the distance of every crossing of the surface with the line that enters `leaf` at `origin` and
-    /// leaves after `to` metres.
+    /// Calls `hit` with the distance of every crossing of the surface and a line through `leaf` from `origin` over `to`
+    /// metres.
     pub(super) fn crossings_in(&self, leaf: &Leaf, origin: DVec3, direction: DVec3, to: f64, hit: &mut dyn FnMut(f64)) {
         // Most lines meet nothing, and the bound at their middle shows that at once.
         let list = self.list(leaf);
@@ -267,8 +266,7 @@ impl Octree {
         });
     }
 
-    /// Visits cubes around the surface, from large to small; see [`Scene::cubes`](super::Scene::cubes). Returns false
-    /// in folded space.
+    /// Visits cubes around the surface; see [`Scene::cubes`](super::Scene::cubes). Returns false in folded space.
     pub(super) fn cubes(&self, visit: &mut dyn FnMut(DVec3, f64, bool) -> bool) -> bool {
         let mut stack = vec![(0_usize, self.min, 0.5 * self.size)];
         while let Some((cell, min, half)) = stack.pop().filter(|_| self.fold == Fold::None) {
@@ -356,8 +354,7 @@ impl Octree {
         DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize_or(DVec3::Z)
     }
 
-    /// `|n.x| + |n.y| + |n.z|` of the normal `n` at a surface point. One-sided differences are accurate enough for a
-    /// sampling density.
+    /// `|n.x| + |n.y| + |n.z|` of the normal `n` at a surface point. One-sided differences are accurate enough here.
     pub(super) fn slant(&self, p: DVec3, list: &[u16]) -> f64 {
         const STEP: f64 = 1e-6;
         let here = self.body.distance(p, list);

@@ -68,8 +68,7 @@ impl Zone {
         Self { leaves, sums }
     }
 
-    /// Calls `visit` for about `lines` cells, drawn in proportion to the area of their faces and evenly spread over
-    /// them.
+    /// Calls `visit` for about `lines` cells, drawn in proportion to face area and evenly spread.
     fn draw<'a>(&'a self, lines: usize, random: &mut Random, visit: &mut dyn FnMut(&'a (Leaf, u8), &mut Random)) {
         let Some(total) = self.sums.last() else { return };
         let mut at = 0;
@@ -104,8 +103,7 @@ impl Zone {
     }
 }
 
-/// Samples the surface with a share `shares[zone]` of the points on each zone. Returns false if cancelled or if a zone
-/// has no surface.
+/// Samples a share `shares[zone]` of the points on each zone. Returns false if cancelled or if a zone has no surface.
 pub(super) fn strew(
     tree: &Octree,
     shares: &[f64],

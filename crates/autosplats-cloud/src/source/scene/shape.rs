@@ -196,8 +196,7 @@ impl Shape {
         match self {
             Self::RoundCone(cone) => cone.distance(p),
             Self::Ellipsoid { at, radii } => {
-                // Distance in the space where the ellipsoid is the unit ball, times the smallest radius: never too
-                // large.
+                // Distance in the space where the ellipsoid is the unit ball, times the least radius: never too large.
                 ((at.local(p) / *radii).length() - 1.0) * radii.min_element()
             }
             Self::Block { at, half, round } => {
