@@ -71,7 +71,7 @@ pub struct Recording {
 impl Recording {
     /// Opens an MCAP file, a ROS 1 bag or the folder of a ROS 2 bag. Reads all transforms, but no points yet.
     ///
-    /// Parts that cannot be played, such as the missing end of a file, are reported as [notes](Progress::note) and
+    /// Data that cannot be played, such as the missing end of a file, are reported as [notes](Progress::note) and
     /// counted as [refused](Statistics::refused).
     ///
     /// # Errors
