@@ -1,4 +1,4 @@
-//! Commands that write clouds, or what is in them: `convert`, `normals` and `info`.
+//! Arguments of the commands that write or describe clouds: `convert`, `normals` and `info`.
 
 use autosplats::NormalSettings;
 use autosplats_cloud::glam::DVec3;
@@ -22,7 +22,7 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_EXAMPLES, override_usage = "autosplats convert [OPTIONS] <INPUT>... <OUT>")]
 pub(crate) struct ConvertArgs {
-    // One list, so that options may stand anywhere between the names.
+    // One list for inputs and output, so that options may stand between the names.
     #[arg(required = true, value_names = ["INPUT", "OUT"], num_args = 1.., help = paths_help())]
     pub(crate) paths: Vec<String>,
     #[command(flatten)]
@@ -36,35 +36,36 @@ pub(crate) struct ConvertArgs {
     pub(crate) run: RunArgs,
 }
 
-/// What is done to the points, in this order.
+/// Point processing of `convert`, in the order of its steps.
 #[derive(Args, Debug)]
-#[command(next_help_heading = "Points, in this order")]
+#[command(next_help_heading = "Point processing, in this order")]
 pub(crate) struct ThinningArgs {
-    /// Strew so many points over the surface of each mesh, evenly by area, instead of taking its corners
+    /// Sample COUNT points on the surface of each mesh, evenly by area, instead of taking its corners; such as 250000
+    /// or 1.5M
     #[arg(long, value_name = "COUNT", value_parser = values::count)]
     pub(crate) sample: Option<usize>,
-    /// Keep the points in a box of world coordinates
+    /// Keep the points inside a box of world coordinates, given by its lower and its upper corner
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds, allow_hyphen_values = true)]
     pub(crate) bounds: Option<[DVec3; 2]>,
-    /// Keep the first of every so many points
+    /// Keep the first of every COUNT points
     #[arg(long, value_name = "COUNT", value_parser = values::step)]
     pub(crate) every: Option<usize>,
-    /// Keep one point for each cube of this size: the one nearest to the mean
+    /// Keep one point per cube of edge length SIZE, in the input's units: the point nearest to the mean of its cube
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,
-    /// Shake the points by normally distributed noise with this standard deviation along each axis
+    /// Add normally distributed noise of standard deviation SIZE, in the input's units, along each axis
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,
-    /// Another seed makes other noise and other samples
+    /// Seed of noise and samples; the same seed gives the same points
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     pub(crate) seed: u64,
 }
 
-/// What the names are, and what can be written.
+/// Help on the names: inputs, and the formats that can be written.
 fn paths_help() -> String {
     let formats = written_formats().flat_map(|(_, extensions)| extensions).map(|extension| format!(".{extension}"));
     let formats = formats.collect::<Vec<_>>().join(" ");
-    format!("{INPUT_HELP} The last name is the file to write; it tells the format: {formats}")
+    format!("{INPUT_HELP} The last name is the file to write, its extension the format: {formats}")
 }
 
 const NORMALS_EXAMPLES: &str = "\
@@ -73,26 +74,26 @@ Examples:
   autosplats normals survey.laz normals.laz -k 20 --orient up
   autosplats normals sweep.bin normals.ply --sensor 0,0,1.8
 
-The file gets all that the input has, and:
+The file keeps all attributes of the input and adds:
   NormalX NormalY NormalZ  unit normal (nx ny nz in PLY)
-  Curvature                0 where flat, 1/3 where there is no surface
-  DensityRadius            twice the radius of the circle that each neighbour covers on average";
+  Curvature                surface variation, from 0 (flat) to 1/3 (no direction is special)
+  DensityRadius            twice the radius of the circle that each neighbour covers on average, in the input's units";
 
 #[derive(Args, Debug)]
 #[command(after_help = NORMALS_EXAMPLES, override_usage = "autosplats normals [OPTIONS] <INPUT>... <OUT>")]
 pub(crate) struct NormalsArgs {
-    // One list, so that options may stand anywhere between the names.
+    // One list for inputs and output, so that options may stand between the names.
     #[arg(required = true, value_names = ["INPUT", "OUT"], num_args = 1.., help = paths_help())]
     pub(crate) paths: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
-    /// Neighbours of each point that a plane is fitted to, 3 to 1024; more is smoother
+    /// Number of neighbours that the plane of each point is fitted to, 3 to 1024; more is smoother
     #[arg(short, value_name = "COUNT", default_value_t = NormalSettings::default().k, allow_negative_numbers = true, help_heading = "Normals")]
     pub(crate) k: u32,
-    /// Which of its two sides a normal points to
+    /// Side that the normals point to
     #[arg(long, value_enum, default_value = "auto", help_heading = "Normals")]
     pub(crate) orient: OrientChoice,
-    /// World coordinates of the one sensor that saw all points, if the file does not say
+    /// Position of the sensor that saw all points, in world coordinates, if the file does not state it
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, conflicts_with = "orient", help_heading = "Normals")]
     pub(crate) sensor: Option<DVec3>,
     /// Replace an existing file
@@ -116,15 +117,15 @@ pub(crate) struct InfoArgs {
         required = true,
         value_name = "INPUT",
         help = "\
-A point cloud file, or a generated scene as scene:NAME[:COUNT]. Of several, those that cannot be read are named and the \
-others shown."
+A point cloud file, or a generated scene as scene:NAME[:COUNT]. Several inputs are described one by one; those that cannot \
+be read are reported."
     )]
     pub(crate) inputs: Vec<String>,
-    /// Read all points even where the header tells number, bounds and attributes (LAS, E57): values, spacing, density,
-    /// duplicates
+    /// Read all points for values, spacing, density and duplicates, even if the header (LAS, E57) states number, bounds
+    /// and attributes
     #[arg(long)]
     pub(crate) scan: bool,
-    /// One JSON object on standard output, for several inputs an array of them (--help has its fields)
+    /// Print one JSON object on standard output, or an array of them for several inputs (fields: see --help)
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]

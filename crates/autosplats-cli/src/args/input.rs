@@ -1,4 +1,4 @@
-//! Inputs: how they are placed, read and played.
+//! Options of inputs: pose, reading and playing.
 
 use std::time::Duration;
 
@@ -9,15 +9,15 @@ use crate::values;
 
 pub(super) const INPUT_HELP: &str = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
-generated scene as scene:NAME[:COUNT], such as scene:statue or scene:herd:2M. What moves is a folder or a quoted pattern of files, \
-a recording (.mcap .bag), or - for PLY and PCD files from standard input. Several inputs become one cloud.";
+generated scene as scene:NAME[:COUNT], such as scene:herd:2M. For points that move: a folder, a quoted file pattern, a \
+recording (.mcap .bag), or - for PLY and PCD on standard input. Several inputs are merged.";
 
-/// How inputs are placed and read.
+/// Pose, reading and playing of inputs.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct InputArgs {
-    /// Place an input by a text file: a row-major 4x4 (or 3x4) matrix from its own to world coordinates, or the seven
-    /// numbers tx ty tz qx qy qz qw
+    /// Place INPUT with a pose from a text FILE: a row-major 4x4 or 3x4 matrix from input to world coordinates, or the
+    /// seven numbers tx ty tz qx qy qz qw
     #[arg(long = "pose", value_name = "INPUT=FILE")]
     pub(crate) poses: Vec<String>,
     #[command(flatten)]
@@ -26,50 +26,51 @@ pub(crate) struct InputArgs {
     pub(crate) playing: PlayingArgs,
 }
 
-/// How what moves is played.
+/// Playing of points that move.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Points that move")]
 pub(crate) struct PlayingArgs {
-    /// Files of a sequence in a second, times a second that a glTF or a scene is looked at, and pictures a second of a film
-    /// [default: 10, 30, and for a film the frames' own rate, or 30 where they are not evenly apart]. 'render' takes the frames
-    /// of a pipe for that far apart, else as they come
+    /// Frames per second: files of a sequence [default: 10], samples of a glTF or a scene [default: 30], pictures of a
+    /// film [default: the frames' own rate if even, else 30]. Sets the time between frames of a pipe in 'render'
     #[arg(long, value_name = "RATE", value_parser = values::rate)]
     pub(crate) fps: Option<f64>,
-    /// Topic of a recording to play; can be given several times [default: all that have points]
+    /// Topic of a recording to play, can be repeated [default: all topics with points]
     #[arg(long = "topic", value_name = "NAME")]
     pub(crate) topics: Vec<String>,
-    /// Coordinate frame that points of a recording or over Zenoh are brought into; live ones that cannot be are refused
-    /// [default: the topmost of their sensors]
+    /// Coordinate frame to transform the points of a recording or a zenoh:// stream to; streamed points that cannot be
+    /// transformed are refused [default: topmost frame of the sensors]
     #[arg(long, value_name = "FRAME")]
     pub(crate) fixed_frame: Option<String>,
-    /// Keep the points of the last so many seconds, such as 2s or 500ms
+    /// Also show the points of the last TIME, such as 2s or 500ms
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub(crate) decay: Option<Duration>,
-    /// Keep all points of the past, up to 100 million
+    /// Also show all earlier points, up to 100 million
     #[arg(long, conflicts_with = "decay")]
     pub(crate) accumulate: bool,
-    /// Strew so many points over the surface of each mesh in place of its corners, which move with it
+    /// Sample COUNT points on the surface of each mesh, which move with it, instead of taking its corners; such as
+    /// 250000 or 1.5M
     #[arg(long, value_name = "COUNT", value_parser = values::count)]
     pub(crate) strew: Option<usize>,
-    /// Show what so many simulated scanners, 1 to 4, around each mesh or scene would see of it, each noisier than the one before.
-    /// 'render --color k-radius --range 0.01..0.03' shows in red where that is too little: points as far apart as the upper end
-    /// of the range, or further
+    /// Show each mesh or scene as 1 to 4 simulated scanners around it would see it, each noisier than the one before.
+    /// With 'render --color k-radius --range 0.01..0.03' red marks sparse sampling: k-radii of the upper end of the
+    /// range and more
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u8).range(1..=4))]
     pub(crate) scan: Option<u8>,
 }
 
-/// What files leave open.
+/// Properties that a file may not state.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct ReadingArgs {
-    /// Columns of text and of bare binary records, such as x,y,z,Intensity,red,green,blue; '-' leaves one out
-    /// [default: by the header, or guessed and told]
+    /// Column names of text and headerless binary files, such as x,y,z,Intensity,red,green,blue; '-' skips a column
+    /// [default: from the header, else guessed, with a note]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub(crate) columns: Option<Vec<String>>,
-    /// Camera of depth images in pixels, and their values per metre [default: by a file beside the image]
+    /// Intrinsics of depth images in pixels, and SCALE, pixel values per metre, 1000 if left out [default: from a file
+    /// beside the image, else guessed]
     #[arg(long, value_name = "FX,FY,CX,CY[,SCALE]", value_parser = values::depth_camera)]
     pub(crate) depth_camera: Option<DepthCamera>,
-    /// Keep points at the sensor itself, (0, 0, 0), which scanners write where nothing came back
+    /// Keep points at (0, 0, 0), the sensor itself, which scanners write for missing returns
     #[arg(long)]
     pub(crate) keep_no_returns: bool,
 }

@@ -1,4 +1,4 @@
-//! The command line as it is typed. What the flags mean together is decided in [`render::job`](crate::render).
+//! The command line as typed. [`render::job`](crate::render) combines the flags of `render` into a job.
 
 mod clouds;
 mod input;
@@ -19,7 +19,7 @@ use crate::bench::args::BenchArgs;
 use crate::exit::EXIT_CODES;
 use crate::values;
 
-/// Turns raw point clouds into lit surfaces: no normals, no radii, no preprocessing.
+/// Render raw point clouds as lit surfaces, without normals, radii or preprocessing.
 #[derive(Debug, Parser)]
 #[command(
     name = "autosplats",
@@ -32,44 +32,44 @@ use crate::values;
 pub(crate) struct CommandLine {
     #[command(subcommand)]
     pub(crate) command: Option<Command>,
-    /// Files without a command are viewed.
+    /// Arguments without a command, passed to `view`.
     #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
     pub(crate) rest: Vec<String>,
 }
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Open a window that shows the surface; the same as no command
+    /// Show points as a surface in a window; the default without a command
     View(Box<ViewArgs>),
-    /// Render points to PNG pictures and EXR layers
+    /// Render points to PNG pictures, EXR layers or films
     Render(Box<RenderArgs>),
-    /// Write any input, or several as one, in another format, whole or thinned
+    /// Convert one or several inputs to a file of another format; optionally thin, crop or sample
     Convert(Box<ConvertArgs>),
-    /// Estimate normals, curvature and density of all points into a file
+    /// Estimate normal, curvature and density of every point and write them to a file
     Normals(Box<NormalsArgs>),
-    /// Render every built-in scene and say where the pictures are
+    /// Render every built-in scene and print the paths of the pictures
     Demo(DemoArgs),
-    /// Say what is in files: points, bounds, attributes, units, spacing
+    /// Describe files: points, bounds, attributes, units, spacing
     Info(InfoArgs),
-    /// List what robots publish over Zenoh, points first (in builds with the feature 'zenoh')
+    /// List the topics that robots publish over Zenoh, point clouds first (needs a build with the feature 'zenoh')
     Topics(TopicsArgs),
     /// Time each stage and pass of a frame
     Bench(BenchArgs),
-    /// Say what this machine can do, and whether the program works on it
+    /// Report devices, memory and formats of this machine, and test the program on it
     Doctor(DoctorArgs),
-    /// Print a script that lets a shell complete this program's options
+    /// Print a script for shell completion
     Completions(CompletionsArgs),
-    /// Print the manual page, or write one per command
+    /// Print the manual page, or write one page per command
     Man(ManArgs),
 }
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Running")]
 pub(crate) struct RunArgs {
-    /// Threads to use; the result does not depend on it [default: one per core]
+    /// Number of threads, 1 to 1024; results do not depend on it [default: one per core]
     #[arg(long, value_name = "COUNT", value_parser = values::threads)]
     pub(crate) threads: Option<u16>,
-    /// No progress and no summary on standard error, only errors
+    /// Print only errors on standard error, no progress and no summary
     #[arg(long)]
     pub(crate) quiet: bool,
 }

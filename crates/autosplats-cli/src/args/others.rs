@@ -1,4 +1,4 @@
-//! Commands about this program, this machine and what is around it.
+//! Arguments of the commands about this program, this machine and its network.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use crate::values;
 
 #[derive(Args, Debug)]
 pub(crate) struct DemoArgs {
-    /// Folder for the pictures; made if it is not there
+    /// Folder to write the pictures to; created if missing
     #[arg(short, long, value_name = "DIR", default_value = "autosplats-demo")]
     pub(crate) out: PathBuf,
     #[command(flatten)]
@@ -26,12 +26,12 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_help = TOPICS_EXAMPLES)]
 pub(crate) struct TopicsArgs {
-    /// Where a router or a node listens: zenoh://HOST[:PORT][/?domain=N]; zenoh:/// looks around on this network
+    /// Address of a router or node, zenoh://HOST[:PORT][/?domain=N]; zenoh:/// searches the local network
     pub(crate) address: String,
-    /// How long to listen at most
+    /// Longest time to listen, such as 2s or 500ms
     #[arg(long, value_name = "TIME", default_value = "5s", value_parser = values::duration)]
     pub(crate) wait: Duration,
-    /// One JSON object a line for each topic on standard output
+    /// Print one JSON object per line and topic on standard output
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]
@@ -40,7 +40,7 @@ pub(crate) struct TopicsArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct DoctorArgs {
-    /// One JSON object on standard output
+    /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -48,15 +48,15 @@ pub(crate) struct DoctorArgs {
 const COMPLETIONS_HELP: &str = "\
 To install:
   bash        autosplats completions bash > ~/.local/share/bash-completion/completions/autosplats
-  zsh         autosplats completions zsh > a folder of $fpath, as _autosplats; then start a new shell
+  zsh         autosplats completions zsh > _autosplats, in a folder of $fpath; then start a new shell
   fish        autosplats completions fish > ~/.config/fish/completions/autosplats.fish
-  powershell  autosplats completions powershell | Out-String | Invoke-Expression, in the file that $PROFILE names
+  powershell  autosplats completions powershell | Out-String | Invoke-Expression, in the file $PROFILE
   elvish      eval (autosplats completions elvish | slurp), in ~/.config/elvish/rc.elv";
 
 #[derive(Args, Debug)]
 #[command(after_help = COMPLETIONS_HELP)]
 pub(crate) struct CompletionsArgs {
-    /// Shell to write for
+    /// Shell to write the script for
     #[arg(value_enum)]
     pub(crate) shell: clap_complete::Shell,
 }
@@ -66,7 +66,7 @@ pub(crate) struct CompletionsArgs {
 To read one page:      autosplats man | man -l -
 To install them all:   autosplats man --out ~/.local/share/man/man1")]
 pub(crate) struct ManArgs {
-    /// Folder for one page per command, made if it is not there; without it the main page goes to standard output
+    /// Folder to write one page per command to, created if missing; without it the main page goes to standard output
     #[arg(short, long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Replace existing pages

@@ -1,4 +1,4 @@
-//! How a picture is taken: camera, surface and look.
+//! Options of a picture: camera, surface and look.
 
 use std::path::PathBuf;
 
@@ -13,33 +13,32 @@ use crate::values::{self, Neighbors, Ortho};
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArgs {
-    /// Side to look from, so that everything is in the picture but far outliers [default: iso, from the front, right and above;
-    /// but points in a camera's frame as that camera saw them, and those around a sensor from close behind it, both in
-    /// perspective alone; and those that sensors saw from one side from there]
+    /// Side to look from, with all points but far outliers in the picture [default: chosen from the data: the camera's
+    /// own view for depth images, just behind the sensor for sweeps, the side that sensors saw, otherwise iso]
     #[arg(long, value_enum, conflicts_with_all = ["eye", "camera"])]
     pub(crate) view: Option<Side>,
     /// Position of the eye in world coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, conflicts_with = "camera")]
     pub(crate) eye: Option<DVec3>,
-    /// Point in the middle of the picture [default: the middle of the cloud]
+    /// Point at the centre of the picture, in world coordinates [default: the middle of the cloud]
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, requires = "eye")]
     pub(crate) look_at: Option<DVec3>,
-    /// Direction that is upward in the picture [default: by --axes]
+    /// Direction that points up in the picture [default: the up axis of --axes]
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, requires = "eye")]
     pub(crate) up: Option<DVec3>,
-    /// Vertical field of view in degrees [default: 40]
+    /// Vertical field of view in degrees, 0.01 to 170 [default: 40]
     #[arg(long, value_name = "DEGREES", value_parser = values::fov, allow_negative_numbers = true, conflicts_with_all = ["ortho", "camera"])]
     pub(crate) fov: Option<f64>,
-    /// Orthographic picture, so many world units high; 'fit' shows everything
+    /// Orthographic projection, HEIGHT world units high; 'fit' shows everything
     #[arg(long, value_name = "HEIGHT", value_parser = values::ortho, allow_negative_numbers = true, conflicts_with = "camera")]
     pub(crate) ortho: Option<Ortho>,
-    /// Take the camera from a file that --save-camera wrote
+    /// Read the camera from a file that --save-camera wrote
     #[arg(long, value_name = "FILE")]
     pub(crate) camera: Option<PathBuf>,
-    /// Write the camera of this picture as JSON
+    /// Write the camera of this picture to a JSON file, for --camera
     #[arg(long, value_name = "FILE")]
     pub(crate) save_camera: Option<PathBuf>,
-    /// Which way is up in the input; 'auto' goes by the file and its shape
+    /// Up axis of the input; 'auto' takes it from the file or guesses it from the shape
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) axes: AxesChoice,
 }
@@ -47,12 +46,12 @@ pub(crate) struct CameraArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Surface")]
 pub(crate) struct SurfaceArgs {
-    /// Neighbours of each point that its splat is made from, 1 to 64; more is smoother. 'auto' takes 10, and more, up to
-    /// thousands, where points scatter about the surface, and shows points on no surface as dots or not at all
+    /// Number of neighbours that each splat is made from, 1 to 64; more is smoother. 'auto' takes 10, up to thousands
+    /// where points are noisy, and turns outliers into dots or drops them
     #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) k: Neighbors,
-    /// Points that a pixel keeps, 1 or 2: 2 show outlines, thin parts and dense scans more truly. The engine
-    /// splat-communication and graphics devices with little room keep 1
+    /// Number of points that a pixel keeps, 1 or 2; 2 preserves outlines, thin parts and dense scans. 1 with the engine
+    /// splat-communication and on devices with little memory
     #[arg(
         long,
         value_name = "COUNT",
@@ -60,17 +59,17 @@ pub(crate) struct SurfaceArgs {
         allow_negative_numbers = true
     )]
     pub(crate) points_per_pixel: u32,
-    /// How the neighbours are found
+    /// Algorithm that finds the neighbours
     #[arg(long, value_enum, default_value = "screen-grid")]
     pub(crate) engine: Engine,
-    /// Radius within which the kd-tree looks for a point's neighbours, in the input's units; 'best' tries several and takes
-    /// the fastest that finds 99.9 % of the visible points' neighbourhoods, and keeps the first frame's for all frames
+    /// First search radius of the engine kd-tree, in the input's units. 'best' takes the fastest that finds 99.9 % of
+    /// the visible points' neighbourhoods, and keeps it for all frames
     #[arg(long, value_name = "RADIUS|best", default_value = "best", allow_negative_numbers = true)]
     pub(crate) first_radius: FirstRadius,
-    /// What renders; the picture is the same but for rounding
+    /// Device that renders; pictures are the same except for rounding
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) backend: Backend,
-    /// Expansions of its first search radius after which a point without a neighbour is dropped as an outlier, 0 to 8
+    /// Number of expansions of the search radius, 0 to 8, before a point without neighbours is dropped as an outlier
     #[arg(
         long,
         value_name = "COUNT",
@@ -79,11 +78,11 @@ pub(crate) struct SurfaceArgs {
         conflicts_with = "keep_outliers"
     )]
     pub(crate) e0: u32,
-    /// Keep points that have no neighbour, or are no part of a surface
+    /// Keep outliers: points without neighbours or on no surface
     #[arg(long)]
     pub(crate) keep_outliers: bool,
-    /// Above 1; less keeps narrower gaps open. A point's neighbours end where the next one is further away than all so far times
-    /// the square root of this, or with '-k auto', as long as there is but one, times this
+    /// Growth of the search circle's area that counts as a gap and ends a neighbourhood, above 1; less keeps narrower
+    /// gaps open. With '-k auto' a single neighbour allows the square of it
     #[arg(
         long,
         value_name = "FACTOR",
@@ -92,18 +91,18 @@ pub(crate) struct SurfaceArgs {
         conflicts_with = "bridge_gaps"
     )]
     pub(crate) gap_factor: f32,
-    /// Look for all k neighbours across any gap
+    /// Search all k neighbours across any gap
     #[arg(long)]
     pub(crate) bridge_gaps: bool,
-    /// Factor on the size of every splat, 0.01 to 10
+    /// Factor on the radius of every splat, 0.01 to 10
     #[arg(long, value_name = "FACTOR", default_value_t = Reconstruction::default().splat_scale, allow_negative_numbers = true)]
     pub(crate) splat_scale: f32,
-    /// Draw ellipses that follow the spread of the neighbours, instead of circles; with '-k auto' rows of points are
-    /// ellipses in any case, and what is fitted to noise is circles
+    /// Draw splats as ellipses along the spread of the neighbours instead of circles. With '-k auto' scan lines always
+    /// get ellipses and noisy surfaces circles
     #[arg(long)]
     pub(crate) ellipses: bool,
-    /// Average surfaces over about so many frames, 1 to 32, where points are new and noisy in each; what moves slowly lags
-    /// behind. Points that are the same in each frame are averaged each by itself
+    /// Average surfaces over about COUNT frames, 1 to 32, if each frame has new, noisy points; slow motion lags behind.
+    /// Points that stay the same are averaged one by one
     #[arg(
         long,
         value_name = "COUNT",
@@ -114,10 +113,10 @@ pub(crate) struct SurfaceArgs {
     /// Reconstruct hidden points too
     #[arg(long)]
     pub(crate) no_grid_culling: bool,
-    /// Let the splats of hidden points take part in the depth of the visible surface
+    /// Let splats of hidden points influence the depth of the visible surface
     #[arg(long)]
     pub(crate) no_depth_refinement: bool,
-    /// Leave splats whole at silhouettes, which makes these too wide by as much as splats are
+    /// Do not trim splats at silhouettes, which become too wide by the width of the splats
     #[arg(long)]
     pub(crate) no_trim: bool,
 }
@@ -125,30 +124,30 @@ pub(crate) struct SurfaceArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Look")]
 pub(crate) struct LookArgs {
-    /// auto, rgb, plain, height, intensity, classification, normal, curvature, radius, k-radius, depth, or the name
-    /// of a field of the file (field:NAME if it is called like one of these)
+    /// auto, rgb, plain, height, intensity, classification, normal, curvature, radius, k-radius, depth, or the name of
+    /// a field (field:NAME if a mode has the same name)
     #[arg(long, value_name = "MODE", default_value = "auto", value_parser = values::color)]
     pub(crate) color: ColorMode,
-    /// Values at the two ends of the colour map [default: 1st and 99th percentile of the picture]
+    /// Values at both ends of the colour map [default: 1st and 99th percentile of the picture]
     #[arg(long, value_name = "A..B", value_parser = values::range, allow_hyphen_values = true)]
     pub(crate) range: Option<[f32; 2]>,
-    /// Colours of scalar values [default: reds for radii, gray for intensity, viridis for the rest]
+    /// Colour map of scalar values [default: reds for radii, gray for intensity, otherwise viridis]
     #[arg(long, value_enum)]
     pub(crate) color_map: Option<Map>,
     /// Draw the colour map and its range into the picture
     #[arg(long)]
     pub(crate) legend: bool,
-    /// Show colours as they are, without light
+    /// Show colours without lighting
     #[arg(long)]
     pub(crate) no_lighting: bool,
-    /// How many times as bright the points' own colours are shown where they are lit, 0.01 to 100 [default: 1, and up to 8 where
-    /// all are dark, which the first picture decides for those that follow]
+    /// Brightness factor on the points' own colours where they are lit, 0.01 to 100 [default: 1, up to 8 if all colours
+    /// are dark; the first picture decides for all]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub(crate) exposure: Option<f32>,
-    /// Strength of occlusion, the darkening of creases and of what lies behind something, 0 (off) to 10
+    /// Strength of occlusion, which darkens creases and surfaces behind others, 0 (off) to 10
     #[arg(long, alias = "eye-dome", value_name = "STRENGTH", default_value_t = Shading::default().occlusion, allow_negative_numbers = true)]
     pub(crate) occlusion: f32,
-    /// How the side of a surface is shown that its sensor did not see, where the file says where that stood
+    /// Look of a surface's back, the side that its sensor did not see; needs sensor positions in the file
     #[arg(long, value_enum, default_value_t = BacksChoice::Toned)]
     pub(crate) backs: BacksChoice,
     /// '#rrggbb', '#top,#bottom' or transparent [default: dark grey gradient]

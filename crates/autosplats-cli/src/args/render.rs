@@ -1,4 +1,4 @@
-//! `render`: pictures.
+//! Arguments of `render`.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,11 @@ Examples:
   producer | autosplats render - -o live_%05d.png
   autosplats render scene:figure --scan 4 --color k-radius --range 0.01..0.03 --legend -o scanned_%03d.png
   autosplats render scene:cathedral:10M -o cathedral.png --occlusion 2 --json
-  autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json";
+  autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json
+
+Layers of an .exr file, 32-bit floats except the whole-number index:
+  R G B A Z N.X N.Y N.Z radius kradius curvature index
+Live input (a pipe, --watch, zenoh://) gives a picture per update, until it ends or Ctrl-C is pressed.";
 
 #[derive(Args, Debug)]
 #[command(after_help = RENDER_EXAMPLES, after_long_help = format!("{RENDER_EXAMPLES}\n\n{EXIT_CODES}"))]
@@ -30,28 +34,27 @@ pub(crate) struct RenderArgs {
     pub(crate) inputs: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
-    /// Picture to write: .png (8 bit) or .exr (32-bit float: R G B A Z N.X N.Y N.Z radius kradius curvature index).
-    /// Can be given several times; an existing file is replaced. One name with a number, such as f_%05d.png, writes a picture
-    /// for each frame of what moves, or of what is live for each update as it comes, until it ends or Ctrl-C is pressed; and
-    /// .mp4, .mkv, .webm or .mov a film, if ffmpeg is there, in which all plays at its own speed
+    /// File to write, can be repeated; an existing file is replaced: .png (8 bit) or .exr (layers). A name with a
+    /// number, such as f_%05d.png, gives a picture per frame; .mp4, .mkv, .webm or .mov a film at its own speed (needs
+    /// ffmpeg)
     #[arg(short, long = "out", value_name = "FILE", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
-    /// Width and height of the picture in pixels
+    /// Width and height of the picture in pixels, each 1 to 16384
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
     pub(crate) size: [u32; 2],
-    /// Render so many times as wide and high and average down, 1 to 8: smoother and finer, for .png pictures [default: 2 for
-    /// one picture of up to 1920x1080 pixels, 1 for larger ones, for layers and for frames of what moves]
+    /// Render FACTOR times as wide and high and average down, 1 to 8: smoother and finer .png pictures [default: 2 for
+    /// stills of up to 1920x1080 pixels; 1 for larger ones, frames and .exr layers]
     #[arg(long, value_name = "FACTOR", value_parser = clap::value_parser!(u32).range(1..=8))]
     pub(crate) supersample: Option<u32>,
-    /// Frames of what moves to render, from 0, both ends included: 0..99, 50.., ..9 or 7, as far as there are; of what is live,
-    /// updates in the order they come. Several go to numbered files, f_00007.png where --out says f.png [default: all with a
-    /// numbered name or a film, else the first]
+    /// Frames to render, counted from 0, both ends included: 0..99, 50.., ..9 or 7; of live input, updates as they
+    /// come. Several frames go to numbered files [default: all for a numbered name or a film, else the first]
     #[arg(long, value_name = "A..B", value_parser = values::frame_range, help_heading = "Points that move")]
     pub(crate) frames: Option<FrameRange>,
-    /// Leave out frames whose picture is there already
+    /// Skip frames whose picture exists
     #[arg(long, help_heading = "Points that move")]
     pub(crate) resume: bool,
-    /// Render files, or the newest file of a folder, again each time they change, until Ctrl-C; each picture gets a number
+    /// Render a file, or the newest file of a folder, again whenever it changes, until Ctrl-C; each picture gets a
+    /// number
     #[arg(long, help_heading = "Points that move")]
     pub(crate) watch: bool,
     #[command(flatten)]
@@ -62,8 +65,8 @@ pub(crate) struct RenderArgs {
     pub(crate) look: LookArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
-    /// Print counts, device, camera, outputs and milliseconds per stage as one JSON object on standard output; of frames, one
-    /// a line for each as soon as it is in place
+    /// Print counts, device, camera, outputs and milliseconds per stage as one JSON object on standard output; for
+    /// frames, one line per finished picture
     #[arg(long, help_heading = "Running")]
     pub(crate) json: bool,
 }

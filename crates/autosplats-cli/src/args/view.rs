@@ -1,4 +1,4 @@
-//! `view`: the window.
+//! Arguments of `view`, the window.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ Examples:
   producer | autosplats view -
   autosplats --state survey.json survey.laz
 
-In the window H shows what keys and mouse do.";
+In the window, the key H lists all keys and mouse actions.";
 
 #[derive(Args, Debug)]
 #[command(after_help = VIEW_EXAMPLES, after_long_help = format!("{VIEW_EXAMPLES}\n\n{EXIT_CODES}"))]
@@ -28,19 +28,19 @@ pub(crate) struct ViewArgs {
         value_name = "INPUT",
         help = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
-generated scene as scene:NAME[:COUNT]. What moves is a folder or a quoted pattern of files, a recording (.mcap .bag), or - for PLY \
-and PCD files from standard input. None opens an empty window to drop files on."
+generated scene as scene:NAME[:COUNT]. For points that move: a folder, a quoted file pattern, a recording (.mcap .bag), or - \
+for PLY and PCD on standard input. Without an input the window opens empty; drop files on it."
     )]
     pub(crate) inputs: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
-    /// File that keeps the session, what is open and how it is seen: had again if it is there, written at the end
+    /// Session file with inputs, view and look: restored if it exists, written on exit
     #[arg(long, value_name = "FILE")]
     pub(crate) state: Option<PathBuf>,
     /// Read files again when they change
     #[arg(long)]
     pub(crate) watch: bool,
-    /// What renders; the picture is the same but for rounding [default: as last time, at first auto]
+    /// Device that renders; pictures are the same except for rounding [default: as last time, at first auto]
     #[arg(long, value_enum)]
     pub(crate) backend: Option<Backend>,
     #[command(flatten)]

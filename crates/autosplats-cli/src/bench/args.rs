@@ -1,4 +1,4 @@
-//! What `autosplats bench` can be told.
+//! Arguments of `autosplats bench`.
 
 use std::path::PathBuf;
 
@@ -27,20 +27,20 @@ pub(crate) struct BenchArgs {
     /// Generated scene to render, with its number of points
     #[arg(long, value_name = "NAME[:COUNT]", default_value = "statue:1M")]
     pub(crate) scene: String,
-    /// How neighbours are found
+    /// Algorithm that finds the neighbours
     #[arg(long, value_enum, default_value = "screen-grid")]
     pub(crate) engine: Engine,
-    /// Radius within which the kd-tree looks for a point's neighbours, in the input's units; 'best' tries several and takes
-    /// the fastest that finds 99.9 % of the visible points' neighbourhoods
+    /// First search radius of the engine kd-tree, in the scene's units. 'best' takes the fastest that finds 99.9 % of
+    /// the visible points' neighbourhoods
     #[arg(long, value_name = "RADIUS|best", default_value = "best", allow_negative_numbers = true)]
     pub(crate) first_radius: FirstRadius,
-    /// What renders; several, with commas, are measured one after the other
+    /// Devices that render, separated by commas; measured one after the other
     #[arg(long = "backend", value_enum, value_delimiter = ',', default_value = "auto")]
     pub(crate) backends: Vec<Backend>,
-    /// Neighbours of each point, 1 to 64, or 'auto': 10, and more where points scatter
+    /// Number of neighbours of each point, 1 to 64; 'auto' takes 10, more where points are noisy
     #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) k: Neighbors,
-    /// Points that a pixel keeps, 1 or 2
+    /// Number of points that a pixel keeps, 1 or 2
     #[arg(
         long,
         value_name = "COUNT",
@@ -48,22 +48,22 @@ pub(crate) struct BenchArgs {
         allow_negative_numbers = true
     )]
     pub(crate) points_per_pixel: u32,
-    /// Leave splats whole at silhouettes: with '-k 10 --points-per-pixel 1' the paper's settings
+    /// Do not trim splats at silhouettes; with '-k 10 --points-per-pixel 1' the paper's settings
     #[arg(long)]
     pub(crate) no_trim: bool,
-    /// Shake the points by normally distributed noise with this standard deviation along each axis, in the scene's units
+    /// Add normally distributed noise of standard deviation SIZE, in the scene's units, along each axis
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,
-    /// Width and height of the picture in pixels
+    /// Width and height of the picture in pixels, each 1 to 16384
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
     pub(crate) size: [u32; 2],
-    /// Frames to measure, 1 to 100000, after three that are not
+    /// Number of frames to measure, 1 to 100000, after three that are not measured
     #[arg(long, value_name = "COUNT", default_value = "20", value_parser = values::frames)]
     pub(crate) frames: usize,
-    /// Take the points for new ones in each frame, as a live scanner's are: a GPU has to upload them again
+    /// Treat the points as new in each frame, like a live scanner's; a GPU has to upload them every time
     #[arg(long)]
     pub(crate) stream: bool,
-    /// One JSON object on standard output: scene, device, counts, milliseconds per stage and pass
+    /// Print one JSON object on standard output: scene, device, counts, milliseconds per stage and pass
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]
@@ -86,23 +86,23 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_help = PAPER_EXAMPLES)]
 pub(crate) struct PaperArgs {
-    /// Scenes of the paper's to take, with commas
+    /// Scenes of the paper to measure, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',', default_values = ["bunny", "imperia", "horses", "cathedral"])]
     pub(crate) scenes: Vec<String>,
-    /// The Stanford bunny [default: a generated figure stands in]
+    /// File of the Stanford bunny [default: a generated figure instead]
     #[arg(long, value_name = "FILE")]
     pub(crate) bunny: Option<PathBuf>,
-    /// Folder of meshes of a galloping horse, the first with the triangles of all [default: a generated herd stands in]
+    /// Folder of meshes of a galloping horse; the first has the triangles of all [default: a generated herd instead]
     #[arg(long, value_name = "FOLDER")]
     pub(crate) gallop: Option<PathBuf>,
-    /// Folder for RESULTS.md and results/, which has pictures, charts and the measurements; for RESULTS-quick.md and
-    /// results-quick/ with --quick
+    /// Folder to write RESULTS.md and results/ (pictures, charts, measurements) to; with --quick, RESULTS-quick.md and
+    /// results-quick/
     #[arg(long, value_name = "FOLDER", default_value = "docs")]
     pub(crate) out: PathBuf,
-    /// Small scenes and pictures and few ks: minutes even without a graphics card
+    /// Use small scenes, small pictures and few values of k; takes minutes even without a graphics card
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Measure everything anew instead of going on where the last run in this folder stopped
+    /// Measure everything again instead of resuming the last run in this folder
     #[arg(long)]
     pub(crate) fresh: bool,
     #[command(flatten)]
