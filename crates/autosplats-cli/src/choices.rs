@@ -1,24 +1,24 @@
-//! The names that options take.
+//! Options with named values.
 
 use autosplats::Backs;
 use clap::ValueEnum;
 
 use crate::first_radius::FirstRadius;
 
-/// Which way normals point.
+/// Side that normals point to.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum OrientChoice {
-    /// To the sensor where the file tells its place, else upward for land, else outward
+    /// To the sensor
     Auto,
     /// To the sensor
     Sensor,
-    /// Upward, along z
+    /// Up, along z
     Up,
-    /// Away from the middle
+    /// Away from the middle of the cloud
     Outward,
 }
 
-/// Where to look from.
+/// Side to look from.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum Side {
     Iso,
@@ -30,13 +30,13 @@ pub(crate) enum Side {
     Bottom,
 }
 
-/// Which way is up.
+/// Up axis of the input.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum AxesChoice {
     Auto,
-    /// Surveys, robots
+    /// Z is up: surveys, robots
     ZUp,
-    /// Models
+    /// Y is up: models
     YUp,
     /// X right, y down, z forward, seen from the origin: depth cameras
     Camera,
@@ -44,21 +44,21 @@ pub(crate) enum AxesChoice {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum Engine {
-    /// Buckets of screen points, exact
+    /// Reads buckets of screen points around each point; exact
     ScreenGrid,
-    /// The paper's own: points draw splats onto each other's pixels; on a GPU only, slower
+    /// The paper's engine: points draw splats onto each other's pixels; GPU only, slower
     SplatCommunication,
-    /// The paper's rival: a kd-tree over all points, built anew in each frame; on a GPU only, see --first-radius
+    /// The paper's baseline: a kd-tree over all points, rebuilt in each frame; GPU only, see --first-radius
     KdTree,
 }
 
 impl Engine {
-    /// As it is asked for.
+    /// Name of the engine on the command line.
     pub(crate) fn name(self) -> String {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// The engine that it names; `first_radius` is what the kd-tree begins with.
+    /// The library's engine. `first_radius` is the first search radius of the kd-tree.
     pub(crate) fn with_first_radius(self, first_radius: FirstRadius) -> autosplats::SearchEngine {
         match self {
             Self::ScreenGrid => autosplats::SearchEngine::ScreenGrid,
@@ -70,12 +70,11 @@ impl Engine {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum Backend {
-    /// A hardware GPU where there is one, else the CPU
+    /// A hardware GPU if there is one, else the CPU
     Auto,
-    /// All cores; needs no driver
+    /// All CPU cores; needs no driver
     Cpu,
-    /// The best device that Vulkan, Metal or DirectX 12 has; also one that is a program on the CPU, which is slower than
-    /// 'cpu'
+    /// The best device of Vulkan, Metal or DirectX 12, even a software renderer on the CPU, which is slower than 'cpu'
     Gpu,
 }
 
@@ -89,7 +88,7 @@ impl From<Backend> for autosplats::Backend {
     }
 }
 
-/// How the backs of surfaces are shown.
+/// Look of the backs of surfaces.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum BacksChoice {
     /// Darker and with less colour

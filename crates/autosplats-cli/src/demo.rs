@@ -1,4 +1,4 @@
-//! `autosplats demo`: every built-in scene from its good side.
+//! `autosplats demo`: renders every built-in scene.
 
 use std::fs::create_dir_all;
 use std::time::Instant;
@@ -14,15 +14,15 @@ use crate::progress::Bar;
 use crate::render::{render_failure, scene_camera};
 use crate::threads::start_threads;
 
-/// Pixels of each picture, the paper's.
+/// Size of each picture in pixels, as in the paper.
 const SIZE: [u32; 2] = [1760, 900];
 
-/// Renders each scene into the folder and prints where it is.
+/// Renders each scene into the folder and prints the path of its picture.
 pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
     let DemoArgs { out, run } = args;
     start_threads(run)?;
     create_dir_all(out)
-        .map_err(|error| Failure::new(Exit::Output, format!("{}: cannot make the folder: {error}", out.display())))?;
+        .map_err(|error| Failure::new(Exit::Output, format!("{}: cannot create the folder: {error}", out.display())))?;
     let mut renderer = Renderer::new();
     for (name, about) in Scene::names() {
         let path = out.join(name).with_extension("png");

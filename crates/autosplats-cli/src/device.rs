@@ -1,23 +1,23 @@
-//! What this machine is and has left.
+//! Devices of this machine.
 
 use std::fs::read_to_string;
 
 use autosplats::{AdapterSummary, Renderer};
 use serde::Serialize;
 
-/// What a picture was rendered on.
+/// Device that a picture was rendered on.
 #[derive(Debug, Serialize)]
 pub(crate) struct Device {
     pub(crate) backend: &'static str,
     pub(crate) name: String,
     pub(crate) threads: usize,
     pub(crate) simd: Vec<&'static str>,
-    /// The graphics device, if it was one.
+    /// The graphics device; `None` on the CPU.
     pub(crate) adapter: Option<AdapterSummary>,
 }
 
 impl Device {
-    /// What `renderer` runs on.
+    /// The device of `renderer`.
     pub(crate) fn of(renderer: &Renderer) -> Self {
         match renderer.adapter() {
             Some(adapter) => Self { backend: "gpu", name: adapter.name.clone(), adapter: Some(adapter), ..Self::cpu() },
@@ -25,19 +25,19 @@ impl Device {
         }
     }
 
-    /// One line for people.
+    /// The device in one line, for people.
     pub(crate) fn describe(&self) -> String {
         let Self { backend, name, threads, adapter, .. } = self;
         match adapter {
             None => format!("{backend}: {name}, {threads} threads"),
             Some(AdapterSummary { backend: api, driver, software, .. }) => {
-                let timed = if *software { "; a program on the CPU, each pass waited for" } else { "" };
+                let timed = if *software { "; software on the CPU, waits after each pass" } else { "" };
                 format!("{backend}: {name}, {api}, driver {driver}{timed}")
             }
         }
     }
 
-    /// This machine's processor.
+    /// The processor of this machine.
     pub(crate) fn cpu() -> Self {
         let name = read_to_string("/proc/cpuinfo").ok().and_then(|info| {
             let line = info.lines().find(|line| line.starts_with("model name"))?;

@@ -1,17 +1,17 @@
-//! How the program ends: one line on standard error and a code that says what kind of trouble it was.
+//! Failures: one line on standard error, and an exit code for the kind.
 
 use std::fmt::Display;
 
-/// What kind of trouble ended the program. Each kind is an exit code.
+/// Kind of failure; its value is the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Exit {
-    /// The command line asks for something that does not exist or does not fit together.
+    /// The command line names something that does not exist or does not fit together.
     Usage = 2,
-    /// An input is missing, unreadable, malformed, or shows nothing.
+    /// An input is missing, unreadable or malformed, or shows nothing.
     Input = 3,
     /// An output cannot be written.
     Output = 4,
-    /// The backend asked for is not there.
+    /// The requested backend has no device.
     Device = 5,
     /// The task does not fit into memory.
     Memory = 6,
@@ -19,7 +19,7 @@ pub(crate) enum Exit {
     Interrupted = 130,
 }
 
-/// The codes as `--help` explains them.
+/// Exit codes as `--help` explains them.
 pub(crate) const EXIT_CODES: &str = "\
 Exit codes:
   0    done
@@ -30,33 +30,33 @@ Exit codes:
   6    too large for this machine's memory
   130  interrupted (Ctrl-C); no partial file is left";
 
-/// Why a command ended early.
+/// Why a command failed.
 #[derive(Debug)]
 pub(crate) struct Failure {
-    /// The kind of trouble.
+    /// Kind, and thus exit code.
     pub(crate) exit: Exit,
-    /// What happened and what to do about it, in one line.
+    /// What is wrong and what to do, in one line.
     pub(crate) message: String,
 }
 
 impl Failure {
-    /// A failure of a kind, with its message.
+    /// A failure of this kind with a message.
     pub(crate) fn new(exit: Exit, message: impl Display) -> Self {
         Self { exit, message: plain(message.to_string()) }
     }
 
-    /// Bad usage.
+    /// A failure of bad usage.
     pub(crate) fn usage(message: impl Display) -> Self {
         Self::new(Exit::Usage, message)
     }
 
-    /// Ctrl-C.
+    /// A failure because of Ctrl-C.
     pub(crate) fn interrupted() -> Self {
         Self::new(Exit::Interrupted, "interrupted")
     }
 }
 
-/// What the operating system says without the number that it has for that.
+/// A message of the operating system without its error number.
 fn plain(message: String) -> String {
     let number = message.split_once(" (os error ").and_then(|(said, after)| Some((said, after.split_once(')')?)));
     match number {
@@ -65,7 +65,7 @@ fn plain(message: String) -> String {
     }
 }
 
-/// Names the nearest of `known` to what was typed, or else all of them.
+/// Suggests the known name nearest to `typed`, or lists all if none is near.
 pub(crate) fn suggest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
     let distance = |name: &&&str| strsim::osa_distance(&name.to_lowercase(), &typed.to_lowercase());
@@ -90,7 +90,7 @@ mod tests {
     fn suggestions_are_near_or_all() {
         let known = ["height", "rgb", "Intensity"];
         assert_eq!(suggest("hieght", known), "did you mean 'height'?", "two letters swapped");
-        assert_eq!(suggest("intensty", known), "did you mean 'Intensity'?", "letter case does not count");
+        assert_eq!(suggest("intensty", known), "did you mean 'Intensity'?", "letter case is ignored");
         assert_eq!(suggest("banana", known), "there are: height, rgb, Intensity", "nothing is near");
     }
 }

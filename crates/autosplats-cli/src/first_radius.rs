@@ -1,4 +1,4 @@
-//! `--first-radius`: what the kd-tree search begins with.
+//! `--first-radius`: the first search radius of the kd-tree.
 
 use std::str::FromStr;
 
@@ -9,15 +9,15 @@ use crate::exit::Failure;
 use crate::progress::Bar;
 use crate::render::render_failure;
 
-/// Share of the visible points whose k-radius has to be exact with the best one: the paper's 99.9 % [Paper, §8.1].
+/// Fraction of the visible points whose k-radius must be exact with the best radius, as in the paper [Paper, §8.1].
 const ACCURACY: f64 = 0.999;
 
-/// `0.05` or `best`
+/// A radius such as `0.05`, or `best`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum FirstRadius {
-    /// The fastest that is accurate, found by trying.
+    /// The fastest radius of sufficient accuracy, found by trials.
     Best,
-    /// In the input's units.
+    /// A radius in the input's units.
     Radius(f32),
 }
 
@@ -28,13 +28,13 @@ impl FromStr for FirstRadius {
         match text.parse() {
             _ if text == "best" => Ok(Self::Best),
             Ok(radius) if radius > 0.0 && f32::is_finite(radius) => Ok(Self::Radius(radius)),
-            _ => Err("a radius is a number above 0, or 'best'".into()),
+            _ => Err("must be a number above 0, or 'best'".into()),
         }
     }
 }
 
 impl FirstRadius {
-    /// The radius, or any that is allowed for as long as the best one is not known.
+    /// The radius, or a valid placeholder while the best one is unknown.
     pub(crate) fn unless_best(self) -> f32 {
         match self {
             Self::Best => 1.0,
@@ -42,7 +42,8 @@ impl FirstRadius {
         }
     }
 
-    /// The settings with the best first radius, if that is what was asked for and the engine takes one; a note says which.
+    /// Returns the settings with the best first radius, if it was asked for and the engine takes a first radius. A note
+    /// states the radius.
     pub(crate) fn settle(
         self,
         renderer: &mut Renderer,
@@ -57,13 +58,13 @@ impl FirstRadius {
         if self != Self::Best || !takes_one {
             return Ok(settings);
         }
-        let bar = Bar::spinner("trying first radii", quiet);
+        let bar = Bar::spinner("finding the first radius", quiet);
         let best = best_first_radius(renderer, cloud, camera, size, &settings, ACCURACY).map_err(render_failure)?;
         drop(bar);
         if !quiet {
             let [share, asked] = [best.accuracy, ACCURACY].map(|share| 100.0 * share);
             let fails = if best.accuracy < ACCURACY {
-                format!("; none of those tried reaches {asked:.1} %")
+                format!("; no tried radius reaches {asked:.1} %")
             } else {
                 String::new()
             };

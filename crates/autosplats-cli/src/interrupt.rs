@@ -1,5 +1,5 @@
-//! Ctrl-C: ends the program at once, unless a file is being written; then as soon as its temporary file is gone. What goes on
-//! until somebody ends it [ends gently](end_gently) the first time.
+//! Ctrl-C ends the program at once. If a file is being written, the end waits until its temporary file is removed. Work
+//! without an end of its own [finishes](end_gently) at the first Ctrl-C.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -11,37 +11,38 @@ static GENTLY: AtomicBool = AtomicBool::new(false);
 static ENDING: AtomicBool = AtomicBool::new(false);
 static WRITING: Mutex<()> = Mutex::new(());
 
-/// Installs the handler. Without one (some containers forbid it) Ctrl-C ends the program the system's way.
+/// Installs the handler. Where none can be installed, as in some containers, the system's default ends the program.
 pub(crate) fn install() {
     let _ = ctrlc::set_handler(|| {
         if GENTLY.load(Ordering::SeqCst) && !ENDING.swap(true, Ordering::SeqCst) {
             return;
         }
         REQUESTED.store(true, Ordering::SeqCst);
-        // Whoever writes sees the request, removes its file and lets go; then nothing is left behind.
+        // The writing thread sees the request, removes its temporary file and releases the lock; nothing is left
+        // behind.
         let _nothing_is_being_written = writing();
-        // A line feed, as the terminal shows ^C and perhaps a progress bar on the cursor's line.
+        // The line feed leaves the cursor's line, where the terminal shows ^C and perhaps a progress bar.
         eprintln!("\nerror: interrupted");
         std::process::exit(Exit::Interrupted as i32);
     });
 }
 
-/// From now on the first Ctrl-C only asks the work to come to an [end](ending), and the second ends the program.
+/// Makes the next Ctrl-C only ask the work to [finish](ending). The one after ends the program.
 pub(crate) fn end_gently() {
     GENTLY.store(true, Ordering::SeqCst);
 }
 
-/// Whether the work is to come to its end.
+/// Whether the work has been asked to finish.
 pub(crate) fn ending() -> bool {
     ENDING.load(Ordering::SeqCst)
 }
 
-/// Whether the program is to end at once.
+/// Whether the program has been asked to end at once.
 pub(crate) fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }
 
-/// Held while a temporary file exists.
+/// Lock that is held while a temporary file exists.
 pub(crate) fn writing() -> MutexGuard<'static, ()> {
     WRITING.lock().unwrap_or_else(PoisonError::into_inner)
 }

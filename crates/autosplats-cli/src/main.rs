@@ -1,7 +1,7 @@
-//! The `autosplats` command: raw point clouds to lit surfaces.
+//! The `autosplats` command: renders raw point clouds as lit surfaces.
 //!
-//! Thin: [`args`] is what was typed, each command turns that into one job and hands it to the library. Data goes to
-//! standard output, everything for people to standard error.
+//! The command is thin: [`args`] is what was typed; each command turns it into one job for the library. Data goes to
+//! standard output, messages for people to standard error.
 
 mod args;
 mod bench;
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
     interrupt::install();
     let outcome = match CommandLine::try_parse() {
         Ok(command_line) => run(command_line),
-        // --help and --version arrive as errors too.
+        // clap returns --help and --version as errors too.
         Err(answer) if !answer.use_stderr() => output::print_line(answer.render().to_string().trim_end()),
         Err(help) if help.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             eprint!("{}", help.render());
@@ -56,14 +56,14 @@ fn main() -> ExitCode {
     }
 }
 
-/// Looking for graphics devices, Mesa asks Wayland which one the screen hangs on, and where there is no session it says so
-/// on standard error, which is ours. A choice the user made stays.
+/// Keeps Mesa's device selection from printing to standard error, where the command's own messages go. Without a
+/// session, Mesa cannot ask Wayland for the screen's device and reports that. A choice that the user made stays.
 #[allow(unsafe_code, reason = "the environment can be changed in no other way")]
 fn hush_drivers() {
     const CHOICE: &str = "NODEVICE_SELECT";
     if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() && std::env::var_os(CHOICE).is_none()
     {
-        // SAFETY: this is the first thing the program does; there is no other thread yet.
+        // SAFETY: this is the first statement of the program, and no other thread exists yet.
         unsafe { std::env::set_var(CHOICE, "1") };
     }
 }
@@ -85,7 +85,7 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
     }
 }
 
-/// Inputs without a command are to be viewed; a word that is neither an input nor a command is explained.
+/// Views inputs that have no command. A word that is neither an input nor a command is an error with a suggestion.
 fn without_command(typed: Vec<String>) -> Result<(), Failure> {
     let first = typed.first().map_or("", String::as_str);
     let is_address = first.starts_with("scene:") || first.contains("://");
@@ -95,10 +95,10 @@ fn without_command(typed: Vec<String>) -> Result<(), Failure> {
     }
     let commands = CommandLine::command();
     let names = commands.get_subcommands().map(clap::Command::get_name);
-    Err(Failure::usage(format!("there is no command '{first}'; {} (--help explains)", suggest(first, names))))
+    Err(Failure::usage(format!("no command is called '{first}'; {} (see --help)", suggest(first, names))))
 }
 
-/// What is wrong with the command line, without the page about its usage.
+/// The error in one line, without the usage.
 fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let paragraphs = text.split("\n\n").filter(|part| !part.starts_with("Usage:") && !part.starts_with("For more"));
@@ -106,5 +106,5 @@ fn one_line(error: &clap::Error) -> String {
         let part = part.trim().trim_start_matches("error: ").trim_start_matches("tip: ");
         part.split_whitespace().collect::<Vec<_>>().join(" ")
     };
-    format!("{} (--help explains)", paragraphs.map(plain).collect::<Vec<_>>().join("; "))
+    format!("{} (see --help)", paragraphs.map(plain).collect::<Vec<_>>().join("; "))
 }

@@ -1,4 +1,5 @@
-//! `autosplats completions` and `autosplats man`: what shells and manual readers want, made from the same command line.
+//! `autosplats completions` and `autosplats man`: shell scripts and manual pages, generated from the command line's
+//! definition.
 
 use std::fs::create_dir_all;
 use std::io::Write as _;
@@ -10,7 +11,7 @@ use crate::args::{CommandLine, CompletionsArgs, ManArgs};
 use crate::exit::{Exit, Failure};
 use crate::output::{ReadFiles, check_target, print_bytes, print_line, write_file};
 
-/// Prints the script of a shell.
+/// Prints the completion script of a shell.
 pub(crate) fn completions(args: &CompletionsArgs) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut CommandLine::command(), "autosplats", &mut script);
@@ -24,15 +25,15 @@ pub(crate) fn manual(args: &ManArgs) -> Result<(), Failure> {
         return print_bytes(&render(&pages[0].1)?);
     };
     create_dir_all(folder).map_err(|error| {
-        Failure::new(Exit::Output, format!("{}: cannot make the folder: {error}", folder.display()))
+        Failure::new(Exit::Output, format!("{}: cannot create the folder: {error}", folder.display()))
     })?;
     let paths: Vec<_> = pages.iter().map(|(name, _)| folder.join(format!("{name}.1"))).collect();
-    // All or none: nothing is written before everything may be.
+    // Every target is checked before the first is written, so that a refusal leaves no partial set.
     for path in &paths {
         if path.exists() && !args.force {
             return Err(Failure::new(
                 Exit::Output,
-                format!("{}: is already there; --force replaces it", path.display()),
+                format!("{}: already exists; --force replaces it", path.display()),
             ));
         }
         check_target(path, &ReadFiles::default())?;
@@ -45,7 +46,7 @@ pub(crate) fn manual(args: &ManArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The program's page and those of all commands, by name.
+/// Pages of the program and of all commands, each with its name.
 fn pages() -> Vec<(String, Command)> {
     let mut program = CommandLine::command().disable_help_subcommand(true);
     program.build();

@@ -1,4 +1,4 @@
-//! Progress on standard error, for people: only on a terminal, and only for what takes longer than half a second.
+//! Progress on standard error: only on a terminal, and only for tasks of more than half a second.
 
 use std::io::{IsTerminal as _, stderr};
 use std::path::Path;
@@ -17,28 +17,28 @@ const PATIENCE: Duration = Duration::from_millis(500);
 const REDRAW: Duration = Duration::from_millis(100);
 const STEPS: u64 = 1000;
 
-/// Notes on one input that plays; streams of garbage have no end.
+/// Most notes on one input that plays. A stream of malformed data has no end.
 const MOST_NOTES: u64 = 50;
 
-/// One task on the screen. It vanishes when dropped.
+/// A progress bar on the terminal. It disappears when dropped.
 pub(crate) struct Bar {
     bar: ProgressBar,
-    /// What [notes](Progress::note) are about.
+    /// Input that [notes](Progress::note) are about.
     subject: String,
-    /// Whether notes are not wanted.
+    /// Whether notes are suppressed.
     quiet: bool,
-    /// Dropped to end the thread that draws.
+    /// Sender that ends the drawing thread when dropped.
     done: Option<Sender<()>>,
     drawing: Option<JoinHandle<()>>,
 }
 
 impl Bar {
-    /// Starts a task that [reports](Progress::report) how far it is.
+    /// Starts a task that [reports](Progress::report) its progress.
     pub(crate) fn new(task: &str, quiet: bool) -> Self {
         Self::start(task, quiet, "{msg:30!} [{bar:40}] {percent:>3} % {eta:>4}", "=> ")
     }
 
-    /// Starts a task on a file, to which its notes then belong.
+    /// Starts a task on a file, which its notes then name.
     pub(crate) fn on_file(task: &str, file: &Path, quiet: bool) -> Self {
         let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
         let mut bar = Self::new(&format!("{task} {name}"), quiet);
@@ -46,7 +46,7 @@ impl Bar {
         bar
     }
 
-    /// Starts a task to which the notes on `input` belong.
+    /// Starts a task whose notes name `input`.
     pub(crate) fn on_input(task: &str, input: &str, quiet: bool) -> Self {
         let mut bar = Self::new(task, quiet);
         bar.subject = input.into();
@@ -59,12 +59,12 @@ impl Bar {
         }
     }
 
-    /// A share of this task, one of `parts` equal ones, that reports on an input.
+    /// Returns one of `parts` equal parts of this task, which reports on an input.
     pub(crate) fn part(&self, parts: usize, subject: &str) -> Part<'_> {
         Part { bar: self, parts, subject: subject.into(), done: AtomicU64::new(0), notes: Mutex::default() }
     }
 
-    /// Starts a task that cannot say how far it is.
+    /// Starts a task of unknown progress.
     pub(crate) fn spinner(task: &str, quiet: bool) -> Self {
         Self::start(task, quiet, "{msg:30!} {spinner} {elapsed}", "-\\|/ ")
     }
@@ -110,7 +110,7 @@ impl Progress for Bar {
     }
 }
 
-/// Passes on what parts of a task have to say of an input: how far each is counts for nothing in all of them.
+/// Notes of a part of a task on one input. The part's progress is ignored.
 pub(crate) struct Notes<'a> {
     bar: &'a Bar,
     subject: String,
@@ -118,16 +118,16 @@ pub(crate) struct Notes<'a> {
 }
 
 impl<'a> Notes<'a> {
-    /// Those on `input`, of which the first are told.
+    /// Creates the notes on `input`. Only the first `MOST_NOTES` are printed.
     pub(crate) fn new(bar: &'a Bar, input: &str) -> Self {
         Self { bar, subject: input.into(), told: AtomicU64::new(0) }
     }
 
-    /// Tells something.
+    /// Prints a note.
     pub(crate) fn tell(&self, note: &str) {
         match self.told.fetch_add(1, Ordering::Relaxed) {
             told if told < MOST_NOTES => self.bar.tell(&self.subject, note),
-            MOST_NOTES => self.bar.tell(&self.subject, "what more there is of this kind is not told"),
+            MOST_NOTES => self.bar.tell(&self.subject, "further notes on this input are omitted"),
             _ => {}
         }
     }
@@ -145,14 +145,14 @@ impl Progress for Notes<'_> {
     }
 }
 
-/// One of several pieces of work that go on side by side, on one bar.
+/// Progress of one of several parallel parts of a task, on one bar.
 pub(crate) struct Part<'a> {
     bar: &'a Bar,
     parts: usize,
     subject: String,
     /// Steps of the bar that this part has added.
     done: AtomicU64,
-    /// Told in the end, so that the notes of several parts do not mix.
+    /// Notes of this part, printed at its end so that the notes of several parts do not mix.
     notes: Mutex<Vec<String>>,
 }
 

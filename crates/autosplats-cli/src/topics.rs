@@ -1,4 +1,4 @@
-//! `autosplats topics`: what robots publish.
+//! `autosplats topics`: lists the topics that robots publish over Zenoh.
 
 use crate::args::TopicsArgs;
 use crate::exit::Failure;
@@ -29,14 +29,14 @@ pub(crate) fn run(args: &TopicsArgs) -> Result<(), Failure> {
         }
     }
     if !run.quiet && !found.iter().any(|topic| topic.has_points()) {
-        eprintln!("note: none of them has points (sensor_msgs/PointCloud2)");
+        eprintln!("note: no topic has points (sensor_msgs/PointCloud2)");
     }
     Ok(())
 }
 
-/// This build has no Zenoh.
+/// Fails: this build has no Zenoh.
 #[cfg(not(feature = "zenoh"))]
 pub(crate) fn run(args: &TopicsArgs) -> Result<(), Failure> {
     let TopicsArgs { address, .. } = args;
-    Err(Failure::usage(format!("{address}: this build has no Zenoh; it takes one with the feature 'zenoh'")))
+    Err(Failure::usage(format!("{address}: this build has no Zenoh; build it with the feature 'zenoh'")))
 }

@@ -21,9 +21,9 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     })
 }
 
-/// This build has no window.
+/// Fails: this build has no window.
 #[cfg(not(feature = "viewer"))]
 pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     let inputs = args.inputs.join(" ");
-    Err(Failure::usage(format!("this build has no viewer; for a picture: autosplats render {inputs} -o out.png")))
+    Err(Failure::usage(format!("this build has no viewer; make a picture with: autosplats render {inputs} -o out.png")))
 }
