@@ -1,4 +1,4 @@
-//! `autosplats convert`: any input, or several as one, to a file of another kind.
+//! `autosplats convert`: writes one or several inputs to a file of another format.
 
 use autosplats_cloud::{Error, PointCloud, Unit};
 
@@ -21,11 +21,11 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     };
     let read = cloud.len();
     if cloud.crs().unit == Some(Unit::Degree) && (thinning.voxel.is_some() || thinning.noise.is_some()) && !run.quiet {
-        eprintln!("note: the coordinates are degrees, so sizes are, too");
+        eprintln!("note: the coordinates are in degrees, so --voxel and --noise are too");
     }
     thin(&mut cloud, thinning, run.quiet)?;
     if cloud.is_empty() {
-        return Err(Failure::new(Exit::Input, format!("none of the {read} points is left; widen --bounds")));
+        return Err(Failure::new(Exit::Input, format!("none of the {read} points lies inside; widen --bounds")));
     }
     let bytes = write_cloud(&cloud, &output, run.quiet)?;
     if !run.quiet {
@@ -47,7 +47,7 @@ fn thin(cloud: &mut PointCloud, thinning: &ThinningArgs, quiet: bool) -> Result<
         cloud.thin_by_voxel(size, &bar).map_err(edit_failure)?;
     }
     if let Some(sigma) = thinning.noise {
-        let bar = Bar::new("shaking", quiet);
+        let bar = Bar::new("adding noise", quiet);
         cloud.add_noise(sigma, thinning.seed, &bar).map_err(edit_failure)?;
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! `autosplats doctor`: what this machine can do, and whether the program works on it.
+//! `autosplats doctor`: reports what this machine can do and tests the program on it.
 
 use std::fs::read_to_string;
 use std::io::{IsTerminal as _, stderr, stdout};
@@ -16,28 +16,28 @@ use crate::info::wrapped;
 use crate::output::{print_bytes, print_line};
 use crate::render::scene_camera;
 
-/// Bytes that a point takes at least: position and colour.
+/// Least memory of a point in bytes: position and colour.
 const BYTES_PER_POINT: u64 = 12 + 3;
 
-/// How much more the whole program takes at its peak while it reads a file and renders it, as measured.
+/// Peak memory of the program over that of the points, while it reads a file and renders it.
 const PEAK: f64 = 2.3;
 
 /// Points and pixels of the self-test.
 const TEST_POINTS: usize = 20_000;
 const TEST_SIZE: [u32; 2] = [320, 200];
 
-/// Columns before what is said of a thing.
+/// Indent of wrapped text in columns.
 const INDENT: usize = 20;
 
-/// Everything that was found out. Its JSON is what `--json` prints.
+/// All findings, in the shape of `--json`.
 #[derive(Debug, Serialize)]
 struct Findings {
     version: &'static str,
     system: String,
-    /// Whether nothing is broken.
+    /// Whether the self-test passed.
     ok: bool,
     backends: Vec<Backend>,
-    /// Graphics devices, the one that is used first.
+    /// Graphics devices; the first is used.
     adapters: Vec<AdapterSummary>,
     cpu: Cpu,
     memory: Memory,
@@ -59,7 +59,7 @@ struct Cpu {
     threads: usize,
     simd_found: Vec<&'static str>,
     simd_used: &'static str,
-    /// Numbers that one instruction handles.
+    /// Numbers that one instruction processes.
     lanes: usize,
 }
 
@@ -67,16 +67,16 @@ struct Cpu {
 struct Memory {
     total: Option<u64>,
     available: Option<u64>,
-    /// Points of the largest coloured cloud that can be rendered with what is available.
+    /// Points of the largest coloured cloud that fits into the available memory for rendering.
     largest_cloud: Option<u64>,
 }
 
-/// Milliseconds of what worked, and what did not.
+/// Times of the steps that worked, in milliseconds, and errors of the others.
 #[derive(Debug, Default, Serialize)]
 struct SelfTest {
     generate_ms: Option<f64>,
     render_ms: Option<f64>,
-    /// The same picture on the graphics device, if there is one.
+    /// Time of the same picture on the graphics device, if there is one.
     gpu_ms: Option<f64>,
     write_ms: Option<f64>,
     read_ms: Option<f64>,
@@ -103,7 +103,7 @@ struct Format {
     extensions: &'static [&'static str],
 }
 
-/// Looks at the machine, tries the program on a small scene and prints what came of it.
+/// Examines the machine, tests the program on a small scene and prints the findings.
 pub(crate) fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let findings = Findings::new();
     if args.json {
@@ -114,7 +114,7 @@ pub(crate) fn run(args: &DoctorArgs) -> Result<(), Failure> {
         print_bytes(findings.to_text().as_bytes())?;
     }
     if findings.backends.iter().all(|backend| !backend.ready) {
-        return Err(Failure::new(Exit::Device, "no backend works; the self-test says why"));
+        return Err(Failure::new(Exit::Device, "no backend works; the self-test shows why"));
     }
     match findings.self_test.errors.first() {
         Some(error) => Err(Failure::new(Exit::Output, format!("self-test: {error}"))),
@@ -129,7 +129,7 @@ impl Findings {
         let (simd_used, lanes) = simd_used();
         let available = available_memory();
         let adapters = adapters();
-        let about = "renders on the processor, with every feature".into();
+        let about = "renders on the processor, all features".into();
         Self {
             version: env!("CARGO_PKG_VERSION"),
             system: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
@@ -181,10 +181,10 @@ impl Findings {
         );
         let found = if simd_found.is_empty() { "none known".into() } else { simd_found.join(" ") };
         let per = match lanes {
-            1 => "one number at a time: rendering takes several times as long".into(),
+            1 => "one number at a time; rendering takes several times as long".into(),
             lanes => format!("{lanes} numbers at a time"),
         };
-        line(*lanes > 1, "simd", format!("{simd_used} is used, {per}; found: {found}"));
+        line(*lanes > 1, "simd", format!("uses {simd_used}, {per}; found: {found}"));
         let Memory { total, available, largest_cloud } = &self.memory;
         match (available, largest_cloud) {
             (Some(available), Some(points)) => {
@@ -196,11 +196,11 @@ impl Findings {
                 );
                 line(true, "memory", what);
             }
-            _ => line(false, "memory", "this system does not say; too large a cloud ends without a message".into()),
+            _ => line(false, "memory", "unknown on this system; too large a cloud ends the program without a message".into()),
         }
         let SelfTest { generate_ms, render_ms, gpu_ms, write_ms, read_ms, temporary_folder, errors } = &self.self_test;
         let took = [
-            ("made", generate_ms),
+            ("generated", generate_ms),
             ("rendered", render_ms),
             ("rendered on the GPU", gpu_ms),
             ("written", write_ms),
@@ -235,7 +235,7 @@ impl Findings {
 }
 
 impl SelfTest {
-    /// Makes a small scene, renders it, writes it and reads it back.
+    /// Generates a small scene, renders it, writes it and reads it back.
     fn run() -> Self {
         let folder = std::env::temp_dir();
         let mut test = Self { temporary_folder: folder.display().to_string(), ..Self::default() };
@@ -279,7 +279,7 @@ impl SelfTest {
 
         let start = Instant::now();
         let folder = tempfile::Builder::new().prefix("autosplats-").tempdir().map_err(|error| {
-            format!("{}: cannot be written ({error}); the variable TMPDIR names another folder", self.temporary_folder)
+            format!("{}: cannot be written ({error}); set the variable TMPDIR to another folder", self.temporary_folder)
         })?;
         let path = folder.path().join("test.ply");
         write(&cloud, &path, &()).map_err(|error| said(&error))?;
@@ -288,24 +288,24 @@ impl SelfTest {
         let back = read(&path, &()).map_err(|error| said(&error))?;
         self.read_ms = since(start);
         if back.positions() != cloud.positions() || back.colors() != cloud.colors() {
-            return Err("a cloud that was written and read is not the same any more".into());
+            return Err("a cloud differs after writing and reading it".into());
         }
         Ok(())
     }
 }
 
-/// What the GPU backend would run on, and what that means.
+/// Description of the GPU backend's device.
 fn about_gpu(adapters: &[AdapterSummary]) -> String {
     match adapters.first() {
         None => "no Vulkan, Metal or DirectX 12 device; pictures are rendered on the processor".into(),
         Some(AdapterSummary { name, software: true, .. }) => {
-            format!("{name} is a program on the processor, slower than the CPU backend; only used if asked for")
+            format!("{name} is software on the processor, slower than the CPU backend; used only with --backend gpu")
         }
-        Some(AdapterSummary { name, .. }) => format!("renders on {name}; used unless --backend says otherwise"),
+        Some(AdapterSummary { name, .. }) => format!("renders on {name}; used unless --backend cpu is given"),
     }
 }
 
-/// What a device can do, and what that means.
+/// Description of a device's capabilities.
 fn about_adapter(adapter: &AdapterSummary) -> String {
     let AdapterSummary { name, backend, kind, driver, software, int64_atomics, timestamps, points_per_binding } =
         adapter;
@@ -318,14 +318,14 @@ fn about_adapter(adapter: &AdapterSummary) -> String {
     let millions = points_per_binding / 1_000_000;
     wrapped(
         &format!(
-            "{name} ({kind}, {backend}, {driver}): projection in {passes}; {timed}; clouds are cut into runs of \
+            "{name} ({kind}, {backend}, {driver}): projection in {passes}; {timed}; clouds are split into runs of \
              {millions} million points"
         ),
         INDENT,
     )
 }
 
-/// The instructions that the renderer uses here, and how many numbers one of them handles.
+/// SIMD instructions that the renderer uses here, and the numbers that one of them processes.
 fn simd_used() -> (&'static str, usize) {
     struct Lanes;
     impl WithSimd for Lanes {
@@ -346,7 +346,7 @@ fn simd_used() -> (&'static str, usize) {
     (name, lanes)
 }
 
-/// Bytes that the machine, or the container around the program, has.
+/// Memory of the machine, or of the container around the program, in bytes.
 fn total_memory() -> Option<u64> {
     let meminfo = read_to_string("/proc/meminfo").ok()?;
     let line = meminfo.lines().find(|line| line.starts_with("MemTotal:"))?;

@@ -1,4 +1,4 @@
-//! Inputs: files and generated scenes, each perhaps placed by a pose, read into one cloud.
+//! Inputs: files and generated scenes, each with an optional pose, read into one cloud.
 
 use std::fs::{metadata, read_to_string};
 use std::path::{Path, PathBuf};
@@ -17,18 +17,18 @@ use crate::exit::{Exit, Failure, suggest};
 use crate::output::{ReadFiles, folder_of};
 use crate::progress::{Bar, Part};
 
-/// What begins the name of a generated scene.
+/// Prefix of a generated scene's name.
 const SCENE_PREFIX: &str = "scene:";
 
-/// How long the first points of something live are waited for.
+/// Longest time to wait for the first points of a live input.
 pub(crate) const FIRST_POINTS: Duration = Duration::from_secs(30);
 
-/// Fields left out, and inputs, that are named.
+/// Most fields and inputs that a message names.
 const LISTED: usize = 10;
-/// Inputs that lie so many times as far from all others as either is large are a few pixels in a picture of both.
+/// Gap between two inputs, in sizes of the larger one, above which a picture of both shows each as a few pixels.
 const FAR_APART: f64 = 200.0;
 
-/// The inputs of one command, known to exist.
+/// The inputs of one command. All files exist.
 #[derive(Debug)]
 pub(crate) struct Inputs {
     list: Vec<Input>,
@@ -37,7 +37,7 @@ pub(crate) struct Inputs {
 }
 
 impl PlayingArgs {
-    /// The flags as the library takes them.
+    /// The options for the library.
     pub(crate) fn options(&self) -> PlayOptions {
         let Self { fps, topics, fixed_frame, decay, accumulate, strew, scan } = self;
         PlayOptions {
@@ -53,7 +53,7 @@ impl PlayingArgs {
 }
 
 impl ReadingArgs {
-    /// The flags as the library takes them.
+    /// The options for the library.
     pub(crate) fn options(&self) -> ReadOptions {
         let Self { columns, depth_camera, keep_no_returns } = self;
         ReadOptions {
@@ -65,13 +65,13 @@ impl ReadingArgs {
     }
 }
 
-/// One input and where it stands in the world.
+/// One input and its pose in the world.
 #[derive(Debug)]
 struct Input {
     name: String,
     source: Source,
     world_from_input: DMat4,
-    /// Where that is read from.
+    /// File of the pose.
     pose: Option<PathBuf>,
 }
 
@@ -79,15 +79,15 @@ struct Input {
 pub(crate) struct Playing {
     pub(crate) name: String,
     pub(crate) player: Player,
-    /// Whether its points change by themselves.
+    /// Whether its points change over time.
     pub(crate) moves: bool,
-    /// So long after the first of those recorded at the same time, if there are others.
+    /// Time from the first of the inputs that were recorded at the same time. `None` if there are no others.
     pub(crate) begins: Option<Duration>,
     pub(crate) world_from_input: DMat4,
 }
 
 impl Inputs {
-    /// Looks at what was typed, without reading a point: names of scenes, existence of files, poses.
+    /// Parses the command line's names without reading a point. Checks scene names, file existence and poses.
     pub(crate) fn new(names: &[String], args: &InputArgs) -> Result<Self, Failure> {
         let InputArgs { poses, reading, playing } = args;
         let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
@@ -97,22 +97,22 @@ impl Inputs {
         let generated = list.iter().map(|input| input.source.least_bytes()).sum();
         check_memory("the points of generated scenes", generated).map_err(read_failure)?;
         if reading.columns.is_some() && list.iter().all(|input| matches!(input.source, Source::Scene(..))) {
-            return Err(Failure::usage("--columns: no input is text; scenes have no columns to name"));
+            return Err(Failure::usage("--columns: no input is a file; generated scenes have no columns"));
         }
         for pose in poses {
             let (place, file) = posed(names, pose).ok_or_else(|| {
                 let names = names.join(", ");
-                Failure::usage(format!("--pose {pose}: it has to be INPUT=FILE with one of the inputs: {names}"))
+                Failure::usage(format!("--pose {pose}: must be INPUT=FILE, where INPUT is one of: {names}"))
             })?;
             list[place].world_from_input = read_pose(file)?;
             list[place].pose = Some(file.into());
         }
-        // A pipe can wait; what it carries cannot be had again.
+        // A pipe's frames are read one by one, since its writer can wait and no frame comes twice.
         let play = PlayOptions { all: true, ..playing.options() };
         Ok(Self { list, options: reading.options(), play })
     }
 
-    /// Of several names the last is the output's.
+    /// Parses the inputs and, as the last name, the output.
     pub(crate) fn with_output(paths: &[String], args: &InputArgs) -> Result<(Self, PathBuf), Failure> {
         match paths {
             [inputs @ .., output] if !inputs.is_empty() => Ok((Self::new(inputs, args)?.exactly(), output.into())),
@@ -126,19 +126,19 @@ impl Inputs {
         Ok(Self { list: vec![input], options: ReadOptions::default(), play: PlayOptions::default() })
     }
 
-    /// Asks for all the digits there are, for what is to be written again.
+    /// Reads all digits, for writing the points again.
     fn exactly(mut self) -> Self {
         self.options.exact = true;
         self
     }
 
-    /// The inputs as the viewer takes them.
+    /// The inputs for the viewer.
     #[cfg(feature = "viewer")]
     pub(crate) fn for_viewer(mut self, watch: bool) -> Vec<autosplats_viewer::Input> {
-        // The window shows how things are now.
+        // The window shows the current state and skips older frames.
         (self.play.watch, self.play.all) = (watch, false);
         let Self { list, options, play } = self;
-        // What would be passed over otherwise asks for files and scenes to be played as well.
+        // Sampling and scanning need a player, and so does a frame rate for scenes and glTF files.
         let made = play.scanners.is_some() || play.sample.is_some();
         let looked_at = |source: &Source| match source {
             Source::Scene(..) => true,
@@ -156,25 +156,25 @@ impl Inputs {
         list.into_iter().map(input).collect()
     }
 
-    /// The first of them.
+    /// The first input.
     pub(crate) fn only(&self) -> &Source {
         &self.list[0].source
     }
 
-    /// The files that are read, those of sequences and of poses among them, and `others`.
+    /// Files that are read, including those of sequences and poses, and `others`.
     pub(crate) fn files<'a>(&'a self, others: impl IntoIterator<Item = &'a Path>) -> ReadFiles {
         let own = self.list.iter().flat_map(|input| input.source.files().into_iter().chain(input.pose.clone()));
         ReadFiles::new(own.chain(others.into_iter().map(Path::to_owned)))
     }
 
-    /// The names as typed, for a message.
+    /// The names as typed, for messages.
     pub(crate) fn names(&self) -> String {
         let names: Vec<&str> = self.list.iter().take(LISTED).map(|input| &*input.name).collect();
         let more = self.list.len() - names.len();
         names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
     }
 
-    /// The scene, if one scene is all there is, where it was generated.
+    /// The scene, if it is the only input and has no pose.
     pub(crate) fn only_scene(&self) -> Option<&Scene> {
         match self.list.as_slice() {
             [Input { source: Source::Scene(scene, _), world_from_input, .. }]
@@ -186,7 +186,7 @@ impl Inputs {
         }
     }
 
-    /// Reads everything into one cloud.
+    /// Reads all inputs into one cloud.
     pub(crate) fn read(&self, quiet: bool) -> Result<PointCloud, Failure> {
         let made = self.play.scanners.is_some() || self.play.sample.is_some();
         self.read_each(quiet, |input, progress| {
@@ -202,7 +202,7 @@ impl Inputs {
         })
     }
 
-    /// Makes the inputs ready to be played, with their poses; files and folders as they change if they are `watched`.
+    /// Prepares the inputs for playing, with their poses. If `watched`, files and folders are followed as they change.
     pub(crate) fn play(&self, watched: bool, quiet: bool) -> Result<Vec<Playing>, Failure> {
         let open = |input: &Input| {
             let bar = Bar::on_file("opening", Path::new(&input.name), quiet);
@@ -227,14 +227,14 @@ impl Inputs {
         Ok(playing)
     }
 
-    /// Whether one of them is a pipe, and none comes when it comes otherwise.
+    /// Whether frames come through a pipe and no input is a Zenoh stream.
     pub(crate) fn come_by_pipe(&self) -> bool {
         let is_pipe = |input: &Input| matches!(input.source, Source::StandardInput);
         let is_remote = |input: &Input| matches!(input.source, Source::Remote(_));
         self.list.iter().any(is_pipe) && !self.list.iter().any(is_remote)
     }
 
-    /// Refuses to watch what cannot be watched, and pictures that would be taken for new files of a watched folder.
+    /// Fails for inputs that cannot be watched. Fails for pictures that would be read as new files of a watched folder.
     pub(crate) fn check_watched(&self, picture: Option<&Path>) -> Result<(), Failure> {
         let watched: Vec<PathBuf> = self
             .list
@@ -247,7 +247,7 @@ impl Inputs {
             .collect();
         if watched.is_empty() {
             return Err(Failure::usage(format!(
-                "--watch: {} is no file and no folder that could change",
+                "--watch: {} is neither a file nor a folder",
                 self.names()
             )));
         }
@@ -262,7 +262,7 @@ impl Inputs {
             && let folder = true_name(folder_of(picture))
             && let Some(folder) = watched.iter().find(|path| path.is_dir() && true_name(path) == folder)
         {
-            let why = "pictures in the folder that is watched would be taken for depth images; name another one";
+            let why = "pictures in a watched folder would be read as depth images; choose another folder";
             return Err(Failure::usage(format!("{}: {why} than {}", picture.display(), folder.display())));
         }
         Ok(())
@@ -271,17 +271,17 @@ impl Inputs {
     /// Plays a file or a folder as it changes.
     fn watch(&self, path: &Path, name: &str) -> Result<Player, Failure> {
         if self.play.sample.is_some() || self.play.scanners.is_some() {
-            return Err(Failure::usage(format!("--watch: {name} is shown as it is; leave out --strew and --scan")));
+            return Err(Failure::usage(format!("--watch: {name} cannot be sampled or scanned; remove --strew and --scan")));
         }
         let stream = Live::watch(path, &self.options).map_err(read_failure)?;
         Ok(Player::new(Box::new(stream), self.play.latest.clone()))
     }
 
-    /// Reads meshes and strews `count` points over the surface of each, into one cloud.
+    /// Reads meshes and samples `count` points on the surface of each, into one cloud.
     pub(crate) fn sample(&self, count: usize, seed: u64, quiet: bool) -> Result<PointCloud, Failure> {
         if let Some(input) = self.list.iter().find(|input| matches!(input.source, Source::Scene(..))) {
             let name = &input.name;
-            return Err(Failure::usage(format!("--sample: {name} is no mesh; name the count with it: {name}:1M")));
+            return Err(Failure::usage(format!("--sample: {name} is not a mesh; give a scene's number of points in its name: {name}:1M")));
         }
         self.read_each(quiet, |input, progress| match &input.source {
             Source::File(path) => sample_surface(&read_mesh(path, &self.options, progress)?, count, seed, &()),
@@ -289,7 +289,7 @@ impl Inputs {
         })
     }
 
-    /// Reads the inputs side by side, each by `read`, and puts them together.
+    /// Reads the inputs in parallel, each by `read`, and merges them.
     fn read_each(
         &self,
         quiet: bool,
@@ -307,11 +307,11 @@ impl Inputs {
                 error => read_failure(error),
             })?;
             if cloud.is_empty() {
-                return Err(Failure::new(Exit::Input, format!("{}: there is no point in it", input.name)));
+                return Err(Failure::new(Exit::Input, format!("{}: there are no points in it", input.name)));
             }
             Ok((cloud, input.world_from_input))
         });
-        // Of several failures, the first input's is told, whichever came first.
+        // Of several failures, the first input's is reported, independent of timing.
         let clouds: Vec<Result<_, Failure>> = clouds.collect();
         let clouds = clouds.into_iter().collect::<Result<Vec<_>, _>>()?;
         tell_disagreements(&clouds, &parts);
@@ -320,9 +320,10 @@ impl Inputs {
     }
 }
 
-/// Which of the inputs `INPUT=FILE` places, by its name or by the last part of it if no other has the same, and the file.
+/// Parses `INPUT=FILE` into the index of the input and the file. INPUT is an input's name, or the last part of the name
+/// if unique.
 fn posed<'a>(names: &[String], pose: &'a str) -> Option<(usize, &'a Path)> {
-    // Of `a` and `a=b` the longer name is meant.
+    // Of the inputs `a` and `a=b`, the longer name wins.
     pose.rmatch_indices('=').find_map(|(at, _)| {
         let (typed, file) = (Path::new(&pose[..at]), Path::new(&pose[at + 1..]));
         let mut ends =
@@ -333,7 +334,7 @@ fn posed<'a>(names: &[String], pose: &'a str) -> Option<(usize, &'a Path)> {
     })
 }
 
-/// Tells what one cloud cannot have because not all of its parts do.
+/// Notes the fields and coordinate systems that the merged cloud loses because the inputs differ in them.
 fn tell_disagreements(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
     let [(first, _), others @ ..] = clouds else { return };
     for ((cloud, _), part) in clouds.iter().zip(parts) {
@@ -350,17 +351,17 @@ fn tell_disagreements(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
         let unit = |cloud: &PointCloud| cloud.crs().unit;
         let units = others.iter().any(|(other, _)| unit(other) != unit(first));
         let what = if units { "coordinate systems and units" } else { "coordinate systems" };
-        parts[0].note(&format!("the inputs differ in their {what}; nothing is converted, none is kept"));
+        parts[0].note(&format!("the inputs differ in their {what}; coordinates are not converted, and the result states none"));
     }
 }
 
-/// Tells which inputs lie so far from all others that a picture hardly shows both.
+/// Notes the inputs that lie too far from all others to be seen in one picture.
 fn tell_far_apart(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
     if clouds.len() < 2 {
         return;
     }
     let boxes: Vec<[DVec3; 2]> = clouds.par_iter().map(world_box).collect();
-    // How many times as far as either is large.
+    // Gap between two boxes, in diagonals of the larger one.
     let apart = |[low, high]: [DVec3; 2], [other_low, other_high]: [DVec3; 2]| {
         let gap = (other_low - high).max(low - other_high).max(DVec3::ZERO).length();
         let size = (high - low).length().max((other_high - other_low).length());
@@ -372,18 +373,18 @@ fn tell_far_apart(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
     };
     let mut far: Vec<_> =
         (0..boxes.len()).map(|at| (at, nearest(at))).filter(|&(_, apart)| apart > FAR_APART).collect();
-    // Of nothing but loners, all but one are.
+    // If every input is far from all others, the first is the reference.
     if far.len() == boxes.len() {
         far.remove(0);
     }
     for (at, apart) in far {
         parts[at].note(&format!(
-            "lies {apart:.0} times as far from the other inputs as it or they are large; a picture hardly shows both, --pose moves it"
+            "lies {apart:.0} times the inputs' size away from the others; a picture hardly shows both; move it with --pose"
         ));
     }
 }
 
-/// The box of all finite points, in the world.
+/// Bounding box of all finite points, in world coordinates.
 fn world_box((cloud, world_from_input): &(PointCloud, DMat4)) -> [DVec3; 2] {
     let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
     let each = cloud
@@ -399,20 +400,20 @@ impl Input {
         if let Some(path) = source.path() {
             let metadata = metadata(path).map_err(|error| {
                 let hint = if Scene::names().any(|(scene, _)| scene == name) {
-                    format!("; for the scene type scene:{name}")
+                    format!("; for the generated scene type scene:{name}")
                 } else {
                     String::new()
                 };
                 Failure::new(Exit::Input, format!("{name}: {error}{hint}"))
             })?;
             if metadata.is_dir() && matches!(source, Source::File(_)) {
-                return Err(Failure::new(Exit::Input, format!("{name}: a folder; name the files in it")));
+                return Err(Failure::new(Exit::Input, format!("{name}: this is a folder; name the files in it")));
             }
         }
         Ok(Self { name: name.into(), source, world_from_input: DMat4::IDENTITY, pose: None })
     }
 
-    /// What reading it is called.
+    /// Title of the reading task.
     fn task(&self) -> String {
         match &self.source {
             Source::File(path) => {
@@ -434,7 +435,7 @@ fn unknown_scene(error: Error) -> Failure {
     })
 }
 
-/// What failing to read is to the caller of the program.
+/// The failure with the exit code of a read error.
 pub(crate) fn read_failure(error: Error) -> Failure {
     match error {
         Error::Cancelled => Failure::interrupted(),
@@ -443,7 +444,8 @@ pub(crate) fn read_failure(error: Error) -> Failure {
     }
 }
 
-/// Reads a row-major 4x4 or 3x4 matrix, or a translation and a quaternion, from a text file: numbers separated by blanks or commas, `#` begins a comment.
+/// Reads a pose from a text file: a row-major 4x4 or 3x4 matrix, or a translation and a quaternion. Blanks or commas
+/// separate the numbers, `#` begins a comment.
 fn read_pose(path: &Path) -> Result<DMat4, Failure> {
     let text =
         read_to_string(path).map_err(|error| Failure::new(Exit::Input, format!("{}: {error}", path.display())))?;
@@ -463,7 +465,7 @@ fn parse_pose(text: &str) -> Result<DMat4, String> {
     if let [tx, ty, tz, qx, qy, qz, qw] = numbers[..] {
         let rotation = DQuat::from_xyzw(qx, qy, qz, qw);
         if (rotation.length() - 1.0).abs() > 0.01 {
-            return Err(format!("the quaternion {qx} {qy} {qz} {qw} is no rotation: its length is not 1"));
+            return Err(format!("the quaternion {qx} {qy} {qz} {qw} is not a rotation: its length must be 1"));
         }
         return Ok(DMat4::from_rotation_translation(rotation.normalize(), DVec3::new(tx, ty, tz)));
     }
@@ -471,11 +473,11 @@ fn parse_pose(text: &str) -> Result<DMat4, String> {
         numbers.extend([0.0, 0.0, 0.0, 1.0]);
     }
     let numbers: [f64; 16] = numbers.try_into().map_err(|numbers: Vec<f64>| {
-        format!("{} numbers; a pose is a row-major matrix of 4x4 or 3x4, or tx ty tz qx qy qz qw", numbers.len())
+        format!("{} numbers; a pose must be a row-major 4x4 or 3x4 matrix, or tx ty tz qx qy qz qw", numbers.len())
     })?;
     let matrix = DMat4::from_cols_array(&numbers).transpose();
     if matrix.row(3) != DVec4::W {
-        return Err("the last row of a pose is 0 0 0 1".into());
+        return Err("the last row of the matrix must be 0 0 0 1".into());
     }
     if matrix.determinant() == 0.0 {
         return Err("the matrix flattens the points (its determinant is 0)".into());

@@ -1,4 +1,4 @@
-//! `autosplats normals`: what the picture previews, for every point and into a file.
+//! `autosplats normals`: estimates the normal, curvature and density of every point and writes them to a file.
 
 use std::borrow::Cow;
 
@@ -15,7 +15,7 @@ use crate::progress::Bar;
 use crate::render::render_failure;
 use crate::threads::start_threads;
 
-/// Bytes for each point beside the cloud: the search tree and the result.
+/// Bytes per point beside the cloud: the search tree and the result.
 const BYTES_PER_POINT: u64 = 40;
 
 /// Reads the inputs, estimates, and writes the file.
@@ -25,7 +25,7 @@ pub(crate) fn run(args: &NormalsArgs) -> Result<(), Failure> {
     let (inputs, output) = Inputs::with_output(paths, input)?;
     if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pts")) {
         return Err(Failure::usage(format!(
-            "{}: PTS has no place for normals; .xyz, .ply and others do",
+            "{}: PTS cannot hold normals; write .xyz, .ply or another format",
             output.display()
         )));
     }
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &NormalsArgs) -> Result<(), Failure> {
     check_memory(&format!("the normals of {} points", cloud.len()), cloud.len() as u64 * BYTES_PER_POINT)
         .map_err(read_failure)?;
     let bar = Bar::new("estimating normals", run.quiet);
-    // Degrees and metres do not make a sphere: such points get the normals that they have on the ground.
+    // A neighbourhood needs one unit along all axes, so coordinates in degrees are estimated as metres on the ground.
     let mut local = Cow::Borrowed(&cloud);
     if cloud.crs().unit == Some(Unit::Degree) {
         local.to_mut().to_local_metres();
@@ -49,12 +49,12 @@ pub(crate) fn run(args: &NormalsArgs) -> Result<(), Failure> {
     let cloud = with_normals(cloud, normals)?;
     let bytes = write_cloud(&cloud, &output, run.quiet)?;
     if !run.quiet {
-        eprintln!("{}: normals of {} points, turned {towards}; {bytes} bytes", output.display(), cloud.len());
+        eprintln!("{}: normals of {} points, pointing {towards}; {bytes} bytes", output.display(), cloud.len());
     }
     Ok(())
 }
 
-/// The result as fields, in place of what the file may have had.
+/// Adds the result as fields, replacing existing ones.
 fn with_normals(cloud: PointCloud, normals: Normals) -> Result<PointCloud, Failure> {
     let Normals { normals, curvature, radius } = normals;
     let axis = |axis: usize| FieldValues::F32(normals.iter().map(|normal| normal[axis]).collect());
@@ -68,7 +68,7 @@ fn with_normals(cloud: PointCloud, normals: Normals) -> Result<PointCloud, Failu
         .map_err(|error| Failure::new(Exit::Input, error))
 }
 
-/// Which way normals are to point, and what that is called.
+/// Orientation of the normals, and its name for the summary.
 fn orientation(
     cloud: &PointCloud,
     choice: OrientChoice,
@@ -93,7 +93,7 @@ fn orientation(
             |orientation| (orientation, "to the sensor"),
         )),
         OrientChoice::Sensor => known().map(|orientation| (orientation, "to the sensor")).ok_or_else(|| {
-            Failure::usage("--orient sensor: the file does not say where the sensor stood; give --sensor X,Y,Z")
+            Failure::usage("--orient sensor: the file does not state the sensor's position; give it with --sensor X,Y,Z")
         }),
         OrientChoice::Up => Ok(UP),
         OrientChoice::Outward => Ok((Orientation::Outward, "outward")),
@@ -102,7 +102,7 @@ fn orientation(
 
 const UP: (Orientation, &str) = (Orientation::Direction(DVec3::Z), "upward");
 
-/// Whether the points are a piece of land, seen from above: much wider than high.
+/// Whether the points are terrain seen from above: much wider than high.
 fn is_terrain(cloud: &PointCloud) -> bool {
     let (min, max) = cloud.positions().iter().filter(|point| point.iter().all(|value| value.is_finite())).fold(
         ([f32::MAX; 3], [f32::MIN; 3]),

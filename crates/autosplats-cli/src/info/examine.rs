@@ -1,4 +1,4 @@
-//! From the name of an input to all that is known of it.
+//! Examines an input: from its name to a report.
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -19,10 +19,11 @@ use crate::exit::Failure;
 use crate::input::{FIRST_POINTS, Inputs, read_failure};
 use crate::progress::Bar;
 
-/// Bytes of a file from which on it is read alone: reading one uses all cores, and two might not fit into memory.
+/// Size in bytes from which files are read one at a time. Reading one uses all cores, and two might not fit into
+/// memory.
 const LARGE: u64 = 64 << 20;
 
-/// Looks at inputs, several at once.
+/// Examines inputs, several at a time.
 pub(super) struct Examiner {
     options: ReadOptions,
     scan: bool,
@@ -31,13 +32,13 @@ pub(super) struct Examiner {
     large: Mutex<()>,
 }
 
-/// What was found, and what went wrong.
+/// The report of an input, and the failure to read it.
 pub(super) struct Examination {
     pub(super) report: Report,
     pub(super) failure: Option<Failure>,
 }
 
-/// Progress to the terminal, notes to the report.
+/// Passes progress to the terminal and collects notes for the report.
 struct Listener<'a> {
     bar: &'a Bar,
     notes: Mutex<Vec<String>>,
@@ -62,7 +63,7 @@ impl Examiner {
         Self { options, scan, quiet, large: Mutex::new(()) }
     }
 
-    /// Finds out what there is to know.
+    /// Examines one input.
     pub(super) fn examine(&self, name: &str) -> Examination {
         let mut report = Report { input: name.into(), ..Report::default() };
         let outcome = Inputs::new(&[name.into()], &InputArgs::default()).and_then(|inputs| {
@@ -99,7 +100,7 @@ impl Examiner {
         Ok(())
     }
 
-    /// Tells what moves by what its container says and by its first points.
+    /// Describes a moving input by its container's summary and its first points.
     fn moving(&self, name: &str, source: &Source, report: &mut Report) -> Result<(), Error> {
         let bar = Bar::new(&format!("reading {name}"), self.quiet);
         let listener = Listener { bar: &bar, notes: Mutex::default() };
@@ -119,7 +120,7 @@ impl Examiner {
             report.warn(note);
         }
         drop(bar);
-        report.format.get_or_insert_with(|| "files that follow each other".into());
+        report.format.get_or_insert_with(|| "sequence of files".into());
         report.warn("points, bounds and attributes are those of the first frame".into());
         report.scan(&cloud, &[]);
         Ok(())
@@ -144,7 +145,7 @@ fn detail(name: impl Into<String>, value: impl Into<String>) -> Detail {
 }
 
 impl Report {
-    /// Takes over what a recording says of itself.
+    /// Adds the summary of a recording.
     fn describe_recording(&mut self, summary: &RecordingSummary) {
         let RecordingSummary { format, topics, frames, frame, notes, .. } = summary;
         self.format = Some(format.clone());
@@ -155,7 +156,7 @@ impl Report {
         if !frames.is_empty() {
             self.details.push(detail("coordinate frames", frames.join(", ")));
         }
-        self.details.extend(frame.iter().map(|frame| detail("points are brought into", frame)));
+        self.details.extend(frame.iter().map(|frame| detail("points are transformed to", frame)));
         notes.iter().for_each(|note| self.warn(note.clone()));
     }
 
@@ -165,7 +166,7 @@ impl Report {
         }
     }
 
-    /// Takes over what the header says.
+    /// Adds the header's facts.
     fn describe(&mut self, header: &Description) {
         let Description { format, points, faces, bounds, attributes, crs, scans, resolution, details, notes } = header;
         self.format = Some(format.clone());
@@ -176,7 +177,7 @@ impl Report {
         self.crs = CrsFound::from(crs);
         self.resolution = resolution.map(Into::into);
         self.scans = scans.iter().map(ScanFound::from).collect();
-        // What is told above needs no telling again.
+        // Facts that have a field of their own are not repeated.
         let told = |name: &str| name == "element face" && faces.is_some();
         self.details = details
             .iter()
@@ -196,7 +197,7 @@ impl Report {
             .collect();
     }
 
-    /// Looks at all points; what they are counts for more than what the header says.
+    /// Adds what all points show; this overrides the header.
     fn scan(&mut self, cloud: &PointCloud, attributes: &[Attribute]) {
         self.scanned = true;
         let header_bounds = self.bounds.take();
@@ -215,29 +216,30 @@ impl Report {
             self.crs = CrsFound::from(cloud.crs());
         }
         self.resolution = cloud.resolution().map(Into::into).or(self.resolution);
-        // Those that cannot be right are left out there.
+        // The reader has already dropped invalid scans.
         self.scans = cloud.scans().iter().map(ScanFound::from).collect();
         self.attributes = values_of(cloud, attributes);
         self.tidy();
         self.compare(header_bounds);
         if count == 0 {
-            self.warn(if cloud.is_empty() { "there is no point in it" } else { "no point has a place" }.into());
+            self.warn(if cloud.is_empty() { "there are no points in it" } else { "no point has a finite position" }.into());
             return;
         }
         if check_memory("", cloud.len() as u64 * spacing::BYTES_PER_POINT).is_err() {
-            self.warn("there is not enough memory to measure spacing and count duplicates; thin the cloud".into());
+            self.warn("not enough memory to measure spacing and count duplicates; thin the cloud".into());
             return;
         }
         self.duplicates = Some(spacing::duplicates(cloud));
         if cloud.crs().unit == Some(Unit::Degree) {
-            self.warn("x and y are degrees, z is not: there is no spacing or density; project them to metres".into());
+            self.warn("x and y are in degrees, z is not: spacing and density are unknown; project the points to metres".into());
         } else {
             (self.spacing, self.density) = spacing::measure(cloud);
         }
         self.check_digits();
     }
 
-    /// Takes off the last digits of coordinates, which the parts they are added up from do not have.
+    /// Rounds coordinates to 15 significant digits. They are sums of an origin and an offset, whose further digits are
+    /// rounding noise.
     fn tidy(&mut self) {
         let Some(bounds) = &mut self.bounds else { return };
         let largest = bounds.min.iter().chain(&bounds.max).fold(0.0_f64, |most, value| most.max(value.abs()));
@@ -254,16 +256,16 @@ impl Report {
         }
     }
 
-    /// Says where the header does not fit the points.
+    /// Warns where the header's bounds contradict the points.
     fn compare(&mut self, header: Option<Bounds>) {
         let (Some(header), Some(bounds)) = (header, self.bounds) else { return };
-        // Whoever dropped points may have changed the bounds.
+        // Dropped points may have changed the bounds.
         if self.points != self.points_in_header {
             return;
         }
         let mut off = Vec::new();
         let largest = |values: [f64; 3]| values.into_iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-        // Programs round what they write there.
+        // Programs round the bounds that they write.
         let rounding = 1e-5 * largest(bounds.size).max(0.01 * largest(bounds.max).max(largest(bounds.min)));
         for (axis, name) in ["x", "y", "z"].iter().enumerate() {
             let allowed = rounding.max(self.resolution.map_or(0.0, |step| 1.5 * step[axis]));
@@ -274,11 +276,11 @@ impl Report {
             }
         }
         if !off.is_empty() {
-            self.warn(format!("the header claims other bounds than the points have: {}", off.join(", ")));
+            self.warn(format!("the header states other bounds than the points have: {}", off.join(", ")));
         }
     }
 
-    /// Says where coordinates are coarser than the points are apart.
+    /// Warns where coordinates are coarser than the spacing of the points.
     fn check_digits(&mut self) {
         let (Some(spacing), Some(bounds)) = (self.spacing, self.bounds) else { return };
         let mut coarse = Vec::new();
@@ -308,16 +310,16 @@ impl Report {
     }
 }
 
-/// `value` with as many decimals as numbers up to `largest` have in 15 digits.
+/// Rounds `value` to the decimals that numbers up to `largest` have in 15 digits.
 fn tidy(value: f64, largest: f64) -> f64 {
     let decimals = if largest > 0.0 { 14 - largest.log10().floor() as i32 } else { 0 };
     let shift = 10_f64.powi(decimals.abs());
     let tidy = if decimals >= 0 { (value * shift).round() / shift } else { value };
-    // A shift beyond all numbers leaves nothing; and there is no minus zero.
+    // An infinite shift keeps `value`. Adding 0 turns -0 into 0.
     if tidy.is_finite() { tidy + 0.0 } else { value }
 }
 
-/// What an attribute of a file becomes in a cloud, if not a field of the same name.
+/// Part of a cloud that an attribute becomes, if not a field of the same name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Meaning {
     Axis(usize),
@@ -336,7 +338,7 @@ fn meaning(name: &str) -> Option<Meaning> {
     })
 }
 
-/// The name without what programs put before it, and in PDAL's words.
+/// An attribute's name without common prefixes, in PDAL's words.
 fn plain_name(name: &str) -> String {
     let lower = name.to_ascii_lowercase();
     let plain: String = lower.trim_start_matches("scalar_").chars().filter(|c| !matches!(c, '_' | ' ')).collect();
@@ -346,7 +348,7 @@ fn plain_name(name: &str) -> String {
     }
 }
 
-/// Statistics of the attributes that the header names, then of what else the cloud has.
+/// Statistics of the header's attributes, then of the cloud's other values.
 fn values_of(cloud: &PointCloud, attributes: &[Attribute]) -> Vec<AttributeFound> {
     let field_of = |name: &str| cloud.fields().iter().position(|field| plain_name(&field.name) == plain_name(name));
     let mut rows: Vec<(String, String, Option<Values<'_>>)> = Vec::new();
@@ -354,7 +356,7 @@ fn values_of(cloud: &PointCloud, attributes: &[Attribute]) -> Vec<AttributeFound
     let mut meanings = Vec::new();
     for Attribute { name, stored } in attributes {
         let known = meaning(name);
-        // 16-bit colours are fields beside the 8-bit ones.
+        // 16-bit colours are fields beside the 8-bit colours.
         let wide = match known {
             Some(Meaning::Channel(channel)) => field_of(["red", "green", "blue"][channel]),
             _ => None,
@@ -370,7 +372,7 @@ fn values_of(cloud: &PointCloud, attributes: &[Attribute]) -> Vec<AttributeFound
             _ => None,
         };
         meanings.extend(known);
-        // What colours of other types are read as is not what the file has.
+        // Colours of other types were converted to 8 bits by the reader.
         let bytes = matches!(values, Some(Values::Channel(..)))
             && (stored.starts_with("uint16") || stored.starts_with("float"));
         let stored = if bytes { format!("{stored}, shown as 8 bits") } else { stored.clone() };
@@ -426,7 +428,7 @@ mod tests {
 
     use super::*;
 
-    /// What the header of a survey in feet says.
+    /// Header of a survey in feet.
     fn header() -> Description {
         let attribute = |name: &str, stored: &str| Attribute { name: name.into(), stored: stored.into() };
         Description {

@@ -1,4 +1,4 @@
-//! `autosplats info`: what is in files.
+//! `autosplats info`: describes files.
 
 mod examine;
 mod report;
@@ -21,10 +21,10 @@ use crate::exit::{Exit, Failure};
 use crate::output::{print_bytes, print_line};
 use crate::threads::start_threads;
 
-/// Looks at each input and prints what it found, in the order they were typed.
+/// Examines the inputs in parallel and prints the reports in the order typed.
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     start_threads(&args.run)?;
-    // All digits: what is said of the points is to be true of the file.
+    // All digits are read, so that the report is true of the file.
     let options = ReadOptions { exact: true, ..args.reading.options() };
     let several = args.inputs.len() > 1;
     let examiner = Examiner::new(options, args.scan, args.run.quiet || several);
@@ -63,7 +63,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
 struct Printer {
     json: bool,
     several: bool,
-    /// Of each input printed, why it could not be read, if so.
+    /// For each printed input, why it could not be read.
     failures: Vec<Option<Failure>>,
 }
 

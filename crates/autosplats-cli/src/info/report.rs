@@ -1,4 +1,4 @@
-//! What `info` knows of one input, in the shape of its JSON.
+//! The report of one input, in the shape of its JSON.
 
 use autosplats_cloud::{Axes, Crs, Scan, glam::DVec3};
 use serde::Serialize;
@@ -6,42 +6,42 @@ use serde::Serialize;
 use super::spacing::{Density, Spacing};
 use super::statistics::Statistics;
 
-/// The JSON of one input, as `info --help` and docs/FORMATS.md explain it.
+/// Description of the JSON, shown by `info --help` and in docs/FORMATS.md.
 pub(crate) const SCHEMA: &str = "\
-Fields of the JSON object. What is not known is null, and lists are then empty; NaN and infinity do
-not occur. Later versions may add fields.
+Fields of the JSON object. Unknown values are null, unknown lists empty; NaN and infinity do not
+occur. Later versions may add fields.
   input             the name as typed
-  error             what kept it from being read, in one line
+  error             why the input could not be read, in one line
   format            format, version and encoding, for people
-  file_bytes        size of the file
-  scanned           whether all points were read; if not, everything is from the header
-  points            points there are; if scanned without those at (0, 0, 0), where nothing was
-                    measured
-  points_in_header  points that the header promises
-  faces             faces of a mesh
-  bounds            least and greatest coordinates: {min: [x, y, z], max: [...], size: [...]}
-  axes              {name: z-up, y-up or camera, guessed: whether from the shape of the cloud}
-  crs               {name, epsg, wkt, unit, vertical_unit, metres_per_unit}, as the file says
-  resolution        step of which coordinates are multiples: [x, y, z]
-  spacing           distance to the nearest of all other points, at up to 10,000 points spread
-                    over the file: {median, p5, p95, mean, samples}; p5 and p95 are percentiles
-  density           points per square unit of surface: {median, neighbors, samples}; at each of
-                    the same points it is n / (pi r^2), r the distance to the n-th nearest
-  duplicates        points at exactly the place of an earlier one
-  not_finite        points with a coordinate that is infinite or not a number
-  attributes        values of a point, coordinates included: {name, stored, min, max, mean,
+  file_bytes        size of the file in bytes
+  scanned           whether all points were read; if not, all facts are from the header
+  points            number of points; if scanned, without points at (0, 0, 0), where nothing
+                    was measured
+  points_in_header  number of points that the header states
+  faces             number of faces of a mesh
+  bounds            smallest and largest coordinates: {min: [x, y, z], max: [...], size: [...]}
+  axes              {name: z-up, y-up or camera, guessed: true if from the cloud's shape}
+  crs               {name, epsg, wkt, unit, vertical_unit, metres_per_unit}, as the file states
+  resolution        step that coordinates are multiples of: [x, y, z]
+  spacing           distance to the nearest other point, at up to 10,000 points spread over
+                    the file: {median, p5, p95, mean, samples}; p5 and p95 are percentiles
+  density           points per square unit of surface at the same points: {median, neighbors,
+                    samples}; n / (pi r^2), with r the distance to the n-th nearest
+  duplicates        points at exactly the position of an earlier one
+  not_finite        points with an infinite or NaN coordinate
+  attributes        values per point, including coordinates: {name, stored, min, max, mean,
                     not_finite, distinct, values, histogram}
     stored          type in the file
-    distinct        how many different values there are, if all are whole and near each other
-    values          [{value, count, name}] if those are at most 32, or classes; name is that of
-                    the ASPRS class
-    histogram       {edges, counts}: up to 32 equal bins, of whole numbers if all values are
-  scans             where sensors stood: {name, position, world_from_sensor, points}; a matrix
-                    row by row, and [first, end] of the points it saw
+    distinct        number of distinct values, if all are whole and near each other
+    values          [{value, count, name}] of up to 32 distinct values, or of all classes;
+                    name is the ASPRS class
+    histogram       {edges, counts}: up to 32 equal bins, with whole edges if all values are
+  scans             sensor poses: {name, position, world_from_sensor, points}; a row-major
+                    matrix, and [first, end] of the points that the sensor saw
   details           further facts from the header: [{name, value}]
-  warnings          what was lost, guessed, dropped, scaled, or contradicts itself";
+  warnings          what was lost, guessed, dropped, scaled or contradictory";
 
-/// Everything known of one input.
+/// All facts about one input.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Report {
     pub(super) input: String,
@@ -66,7 +66,7 @@ pub(crate) struct Report {
     pub(super) warnings: Vec<String>,
 }
 
-/// Least and greatest coordinates, and how far they are apart.
+/// Bounding box, in the file's units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Bounds {
     pub(super) min: [f64; 3],
@@ -75,14 +75,14 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Nothing if they are not finite or turned inside out.
+    /// `None` if the bounds are infinite or inverted.
     pub(super) fn new([min, max]: [DVec3; 2]) -> Option<Self> {
         let valid = min.is_finite() && max.is_finite() && min.cmple(max).all() && (max - min).is_finite();
         valid.then(|| Self { min: min.into(), max: max.into(), size: (max - min).into() })
     }
 }
 
-/// Which way is up.
+/// The up axis.
 #[derive(Debug, Serialize)]
 pub(super) struct AxesFound {
     pub(super) name: &'static str,
@@ -100,7 +100,7 @@ impl AxesFound {
     }
 }
 
-/// What the file says of its coordinate system.
+/// The file's coordinate system.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct CrsFound {
     pub(super) name: Option<String>,
@@ -124,7 +124,7 @@ impl From<&Crs> for CrsFound {
     }
 }
 
-/// One value of each point.
+/// An attribute: one value per point.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct AttributeFound {
     pub(super) name: String,
@@ -133,7 +133,7 @@ pub(super) struct AttributeFound {
     pub(super) statistics: Statistics,
 }
 
-/// Where a sensor stood.
+/// Pose of a sensor.
 #[derive(Debug, Serialize)]
 pub(super) struct ScanFound {
     pub(super) name: Option<String>,
@@ -153,7 +153,7 @@ impl From<&Scan> for ScanFound {
     }
 }
 
-/// A fact from the header.
+/// A further fact from the header.
 #[derive(Debug, Serialize)]
 pub(super) struct Detail {
     pub(super) name: String,

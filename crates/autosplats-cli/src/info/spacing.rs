@@ -1,4 +1,4 @@
-//! How far points are from each other: a k-d tree over all of them, asked at some.
+//! Spacing of points, measured at samples with a k-d tree over all points.
 
 use std::f64::consts::PI;
 
@@ -6,22 +6,22 @@ use autosplats_cloud::PointCloud;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Bytes that the tree, or the sorting that finds duplicates, takes for each point.
+/// Memory in bytes per point of the tree, or of the sorting that finds duplicates.
 pub(super) const BYTES_PER_POINT: u64 = 18;
 
-/// Points at which is measured.
+/// Most points at which spacing and density are measured.
 const SAMPLES: usize = 10_000;
 
-/// Neighbours that the density is measured with.
+/// Number of neighbours that the density is measured with.
 const NEIGHBORS: usize = 12;
 
-/// Points of a leaf at most.
+/// Most points of a leaf.
 const LEAF: usize = 16;
 
-/// Points below which a subtree is not worth another thread.
+/// Least number of points of a subtree that is worth another thread.
 const PARALLEL: usize = 1 << 14;
 
-/// Distance to the nearest other point.
+/// Distance to the nearest other point, in the file's units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Spacing {
     pub(super) median: f64,
@@ -39,7 +39,7 @@ pub(super) struct Density {
     pub(super) samples: usize,
 }
 
-/// Measures at up to [`SAMPLES`] points spread over the cloud, always the same ones.
+/// Measures at up to [`SAMPLES`] points spread over the cloud. The choice of samples is deterministic.
 pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) {
     let finite = |&(position, _): &([f32; 3], u32)| position.iter().all(|value| value.is_finite());
     let numbered = cloud.positions().par_iter().enumerate().map(|(i, position)| (*position, i as u32));
@@ -47,7 +47,7 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
     if points.len() < 2 || u32::try_from(cloud.len()).is_err() {
         return (None, None);
     }
-    // One at a random place of each of as many equal parts, in the file's order.
+    // One random sample from each of equally many parts, in the file's order.
     let samples = points.len().min(SAMPLES);
     let part = |i: usize| (points.len() as u128 * i as u128 / samples as u128) as usize;
     let sampled: Vec<_> = (0..samples)
@@ -64,7 +64,7 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
         .map(|&(position, index)| {
             let mut nearest = Nearest { position, index, count, found: Vec::with_capacity(count + 1) };
             tree.search(&points, &mut nearest);
-            // The search is by the digits that f32 has; what it finds is measured with all there are.
+            // The search uses f32 coordinates; the found distances are measured in f64.
             let own = cloud.world_position(index as usize);
             let mut exact: Vec<f64> =
                 nearest.found.iter().map(|&(_, i)| cloud.world_position(i as usize).distance(own)).collect();
@@ -87,11 +87,11 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
     (Some(spacing).filter(finite), Some(density).filter(|_| count == NEIGHBORS && median.is_finite()))
 }
 
-/// Points that lie exactly where an earlier one lies, by a 64-bit hash of their coordinates.
+/// Number of points at exactly the position of an earlier one, by a 64-bit hash of the coordinates.
 pub(super) fn duplicates(cloud: &PointCloud) -> u64 {
     let hash = |i: usize| {
         let position = cloud.world_position(i);
-        // Adding 0 makes -0 the same place as 0.
+        // Adding 0 turns -0 into 0.
         let hash = |hash: u64, value: f64| mix(hash ^ (value + 0.0).to_bits());
         position.is_finite().then(|| position.to_array().into_iter().fold(1, hash))
     };
@@ -100,7 +100,7 @@ pub(super) fn duplicates(cloud: &PointCloud) -> u64 {
     hashes.par_windows(2).filter(|pair| pair[0] == pair[1]).count() as u64
 }
 
-/// Splitmix: a number that looks random.
+/// SplitMix64: a pseudo-random number.
 fn mix(seed: u64) -> u64 {
     let z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -108,7 +108,7 @@ fn mix(seed: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A k-d tree over a slice of points that it has put in its order: each half of a node's points is a child's.
+/// A k-d tree over a slice of points that it has reordered. Each half of a node's points belongs to one child.
 enum Tree {
     Leaf,
     Node { axis: usize, split: f32, children: Box<[Self; 2]> },
@@ -140,7 +140,7 @@ impl Tree {
         Self::Node { axis, split, children: Box::new([children.0, children.1]) }
     }
 
-    /// Finds neighbours among `points`, the slice that the tree was made over.
+    /// Searches the neighbours among `points`, the slice that the tree was made over.
     fn search(&self, points: &[([f32; 3], u32)], nearest: &mut Nearest) {
         match self {
             Self::Leaf => points.iter().for_each(|point| nearest.see(*point)),
@@ -166,7 +166,7 @@ struct Nearest {
 }
 
 impl Nearest {
-    /// Squared distance beyond which no point is wanted.
+    /// Squared distance above which points are ignored.
     fn bound(&self) -> f64 {
         if self.found.len() < self.count { f64::INFINITY } else { self.found[self.count - 1].0 }
     }
@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn the_tree_finds_what_looking_at_all_finds() {
         let mut positions = random(40_000);
-        // Many at one place, and more at equal x.
+        // Add many points at one position, and more of equal x.
         positions.extend([[5.0, 0.5, 0.05]; 100]);
         positions.extend((0..500).map(|i| [5.0, i as f32 / 500.0, 0.0]));
         let mut points: Vec<_> = positions.iter().zip(0..).map(|(position, i)| (*position, i)).collect();
@@ -220,7 +220,7 @@ mod tests {
         let spacing = spacing.expect("there are points");
         assert_eq!([spacing.median, spacing.p95, spacing.mean], [0.5; 3], "exactly");
         assert_eq!(spacing.samples, 10_000, "a part of them");
-        // The twelfth neighbour on a grid is one of the four at two steps: 12 / (π 1²), of 4 per square unit.
+        // The twelfth neighbour on a grid is one of the four at two steps: 12 / (π 1²), for 4 points per square unit.
         assert_eq!(density.map(|density| density.median), Some(12.0 / PI), "points per square unit");
     }
 

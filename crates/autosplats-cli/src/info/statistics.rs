@@ -1,4 +1,4 @@
-//! The values of one attribute: least, greatest, mean, how often which.
+//! Statistics of the values of one attribute.
 
 use std::ops::Range;
 
@@ -6,19 +6,19 @@ use autosplats_cloud::{FieldValues, PointCloud};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Bins of a histogram at most.
+/// Most bins of a histogram.
 const BINS: usize = 32;
 
-/// Values between the least and the greatest whole number up to which each is counted.
+/// Range of whole values up to which each value is counted.
 const MAX_COUNTED: f64 = 65536.0;
 
-/// Different values up to which each is listed.
+/// Most distinct values that are listed.
 const MAX_LISTED: usize = 32;
 
-/// Points summed up in one go. Sums of blocks are added in order, so that results do not depend on the threads.
+/// Points per partial sum. Partial sums are added in order, so that results do not depend on the threads.
 const BLOCK: usize = 1 << 16;
 
-/// Where values come from.
+/// Source of the values.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Values<'a> {
     /// Coordinates along an axis.
@@ -29,7 +29,7 @@ pub(super) enum Values<'a> {
     Field(&'a FieldValues),
 }
 
-/// What is known of the values of an attribute; nothing if they were not read.
+/// Statistics of an attribute's values; empty if the values were not read.
 #[derive(Debug, Default, PartialEq, Serialize)]
 pub(super) struct Statistics {
     pub(super) min: Option<f64>,
@@ -41,7 +41,7 @@ pub(super) struct Statistics {
     pub(super) histogram: Option<Histogram>,
 }
 
-/// A value and how many points have it.
+/// A value and the number of points with it.
 #[derive(Debug, PartialEq, Serialize)]
 pub(super) struct Counted {
     pub(super) value: f64,
@@ -49,14 +49,14 @@ pub(super) struct Counted {
     pub(super) name: Option<&'static str>,
 }
 
-/// How many values lie between each two edges; the last bin has its upper edge too.
+/// Counts of values between successive edges. The last bin includes its upper edge.
 #[derive(Debug, PartialEq, Serialize)]
 pub(super) struct Histogram {
     pub(super) edges: Vec<f64>,
     pub(super) counts: Vec<u64>,
 }
 
-/// The finite values of a block, summed up.
+/// Sums over the finite values of a block.
 #[derive(Clone, Copy, Debug)]
 struct Summary {
     min: f64,
@@ -134,7 +134,7 @@ impl Values<'_> {
         })
     }
 
-    /// How many values fall into each of `bins`.
+    /// Counts the values of each of `bins`.
     fn count(self, bins: usize, bin: impl Fn(f64) -> usize + Sync) -> Vec<u64> {
         let add = |mut counts: Vec<u64>, more: Vec<u64>| {
             counts.iter_mut().zip(more).for_each(|(count, more)| *count += more);
@@ -149,7 +149,7 @@ impl Values<'_> {
 }
 
 impl Statistics {
-    /// Looks at all values; `classes` says whether they are classes of points.
+    /// Computes the statistics of all values. `classes` marks the values as point classes.
     pub(super) fn of(values: Values<'_>, classes: bool) -> Self {
         let Summary { min, max, sum, count, whole } = values.summary();
         let not_finite = Some(values.len() as u64 - count);
@@ -160,7 +160,7 @@ impl Statistics {
         let mut statistics = Self {
             min: Some(min),
             max: Some(max),
-            // Rounding may not put it outside.
+            // Rounding must not move the mean out of the range.
             mean: Some((sum / count as f64).clamp(min, max)).filter(|mean| mean.is_finite()),
             not_finite,
             ..Self::default()
@@ -192,7 +192,7 @@ impl Statistics {
     }
 }
 
-/// Names of the ASPRS standard classes (LAS 1.4 R15, table 17).
+/// Name of an ASPRS standard class (LAS 1.4 R15, table 17).
 fn class_name(class: f64) -> Option<&'static str> {
     const NAMES: [&str; 23] = [
         "never classified",

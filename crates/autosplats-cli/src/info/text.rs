@@ -1,26 +1,26 @@
-//! A report for people: what matters first, numbers under each other.
+//! The report as text: important facts first, numbers aligned.
 
 use std::fmt::Write as _;
 
 use super::report::{AttributeFound, Bounds, Report};
 use super::statistics::{Histogram, Statistics};
 
-/// Columns of running text.
+/// Width of the text in columns.
 const WIDTH: usize = 100;
 
-/// Columns of the names of facts, and of what stands before them.
+/// Columns of a fact's name and its indent.
 const INDENT: usize = 14;
 
-/// Rows of sensors shown.
+/// Most sensors shown.
 const MAX_SCANS: usize = 8;
 
 impl Report {
-    /// Whether there is more to show than an error.
+    /// Whether the report has more than an error.
     pub(super) fn is_known(&self) -> bool {
         self.format.is_some()
     }
 
-    /// The whole report. Warnings and the name stand out if `styled`.
+    /// The whole report. If `styled`, warnings and the name are highlighted.
     pub(super) fn to_text(&self, styled: bool) -> String {
         let style = |code: &str, text: String| if styled { format!("\x1b[{code}m{text}\x1b[0m") } else { text };
         let mut page = style("1", plain(&self.input)) + "\n";
@@ -78,16 +78,16 @@ impl Report {
             let metric = self.crs.metres_per_unit.filter(|metres| *metres != 1.0);
             let metric = metric
                 .map_or_else(String::new, |metres| format!(" ({} per m²)", short(density.median / (metres * metres))));
-            let around = format!("of surface (median, by {} neighbours)", density.neighbors);
+            let around = format!("of surface (median, from {} neighbours)", density.neighbors);
             fact("density", format!("{} points per {per}{metric} {around}", short(density.median)));
         }
         match self.duplicates {
             Some(0) => fact("duplicates", "none".into()),
-            Some(count) => fact("duplicates", format!("{} at the place of an earlier point", self.part(count))),
+            Some(count) => fact("duplicates", format!("{} at the position of an earlier point", self.part(count))),
             None => {}
         }
         if let Some(not_finite) = self.not_finite.filter(|count| *count > 0) {
-            fact("not finite", format!("{} without a place (NaN or infinite)", self.part(not_finite)));
+            fact("not finite", format!("{} without a finite position", self.part(not_finite)));
         }
         self.attribute_table(&mut page);
         self.class_table(&mut page);
@@ -100,9 +100,9 @@ impl Report {
         page += match (self.scanned, &self.error) {
             (true, _) => "",
             (false, None) => {
-                "  This is what the header says; --scan reads the points: values, spacing, density, duplicates.\n"
+                "  These facts are from the header; --scan reads the points: values, spacing, density, duplicates.\n"
             }
-            (false, Some(_)) => "  This is what the header says; the points could not be read.\n",
+            (false, Some(_)) => "  These facts are from the header; the points could not be read.\n",
         };
         page
     }
@@ -110,7 +110,7 @@ impl Report {
     fn shown_points(&self, points: u64) -> String {
         match self.points_in_header {
             Some(promised) if promised != points => {
-                format!("{} (the header says {})", counted(points), counted(promised))
+                format!("{} (the header states {})", counted(points), counted(promised))
             }
             _ => counted(points),
         }
@@ -151,7 +151,7 @@ impl Report {
         }
     }
 
-    /// The unit behind a number, with a blank before it.
+    /// The cloud's unit symbol with a leading blank.
     fn symbol(&self) -> &'static str {
         self.crs.unit.map_or("", symbol)
     }
@@ -161,14 +161,14 @@ impl Report {
         metric.map_or_else(String::new, |metres| format!(" ({} m)", short(value * metres)))
     }
 
-    /// A number of points, and what part of all that is.
+    /// A number of points and its percentage of all.
     fn part(&self, count: u64) -> String {
         let percent = 100.0 * count as f64 / self.points.unwrap_or(1).max(1) as f64;
         let percent = if percent < 0.05 { "less than 0.1".into() } else { format!("{percent:.1}") };
         format!("{} ({percent} %)", counted(count))
     }
 
-    /// Decimals that coordinates along each axis need.
+    /// Number of decimals for coordinates along each axis.
     fn decimals(&self, bounds: &Bounds) -> [usize; 3] {
         let largest = bounds.size.iter().fold(0.0_f64, |a, b| a.max(*b));
         [0, 1, 2].map(|axis| match self.resolution {
@@ -200,7 +200,7 @@ impl Report {
                 };
                 let shown = |value: &Option<f64>, decimals| value.map_or_else(String::new, |v| number(v, decimals));
                 let mean_decimals = if decimals == 0 { 1 } else { decimals };
-                // Coordinates without a place are counted above.
+                // Points without a finite position are counted above.
                 let bad = not_finite.filter(|count| *count > 0 && axis.is_none());
                 let bad = bad.map_or_else(String::new, |count| format!(" {} not finite", counted(count)));
                 let bars = histogram.as_ref().map_or_else(String::new, sparkline);
@@ -234,7 +234,7 @@ impl Report {
         }
         if !hidden.is_empty() {
             let names: Vec<_> = hidden.iter().map(|attribute| clipped(&plain(&attribute.name), 22)).collect();
-            // Of LAS, all values are read, and those that are nothing but zeros are left out.
+            // The LAS reader reads all values and drops fields that are 0 at every point.
             let las =
                 self.format.as_ref().is_some_and(|format| format.starts_with("LAS") || format.starts_with("COPC"));
             let why = if las { "0 at every point" } else { "no values of their own (part of others, or not read)" };
@@ -291,7 +291,7 @@ impl Report {
     }
 }
 
-/// What stands behind a number of a unit, with a blank before it.
+/// Symbol of a unit with a leading blank.
 fn symbol(unit: &str) -> &'static str {
     match unit {
         "metre" => " m",
@@ -302,7 +302,7 @@ fn symbol(unit: &str) -> &'static str {
     }
 }
 
-/// A histogram in one line, a character per bin; a bin with anything in it is never empty.
+/// A histogram in one line, one character per bin. Only an empty bin is blank.
 fn sparkline(histogram: &Histogram) -> String {
     const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let most = histogram.counts.iter().copied().max().unwrap_or(0).max(1);
@@ -313,16 +313,16 @@ fn sparkline(histogram: &Histogram) -> String {
     histogram.counts.iter().map(bar).collect()
 }
 
-/// Decimals of values between `min` and `max`.
+/// Number of decimals for values between `min` and `max`.
 fn value_decimals(min: f64, max: f64, statistics: &Statistics) -> usize {
     let whole = statistics.distinct.is_some() || (min.fract() == 0.0 && max.fract() == 0.0 && max - min >= 1000.0);
     let range = if max > min { max - min } else { max.abs() };
-    // Eleven digits in all are enough for anyone who looks.
+    // At most eleven digits in all, enough for a reader.
     let integer = min.abs().max(max.abs()).max(1.0).log10().floor() as usize + 1;
     if whole { 0 } else { decimals_for(range, 5).min(11_usize.saturating_sub(integer).max(1)) }
 }
 
-/// Decimals that show `digits` digits of a value.
+/// Number of decimals that show `digits` digits of a value.
 fn decimals_for(value: f64, digits: i32) -> usize {
     if value > 0.0 { (digits - 1 - value.log10().floor() as i32).clamp(0, 12) as usize } else { 0 }
 }
@@ -331,11 +331,11 @@ fn number(value: f64, decimals: usize) -> String {
     if value.abs() >= 1e15 || (value != 0.0 && value.abs() < 1e-9) {
         return format!("{value:.4e}");
     }
-    // Minus zero is zero.
+    // -0 is shown as 0.
     format!("{:.decimals$}", if value == 0.0 { 0.0 } else { value })
 }
 
-/// Three digits, whole numbers whole.
+/// A number in three digits; numbers from 1000 on as whole numbers.
 pub(super) fn short(value: f64) -> String {
     if value.abs() >= 1e9 || (value != 0.0 && value.abs() < 1e-6) {
         return format!("{value:.2e}");
@@ -347,7 +347,7 @@ pub(super) fn short(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
-/// A count with commas.
+/// A count with thousands separators.
 pub(super) fn counted(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::new();
@@ -364,7 +364,7 @@ fn is_whole(value: f64) -> bool {
     (value - value.round()).abs() < 1e-6 * value.abs().max(1e-3)
 }
 
-/// Text of a file without characters that would act on a terminal.
+/// Text of a file with control characters escaped, which could act on a terminal.
 fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for character in text.chars() {
@@ -384,7 +384,7 @@ fn clipped(text: &str, most: usize) -> String {
     text.chars().take(most - 1).chain(['…']).collect()
 }
 
-/// Breaks lines between words; those after the first are indented.
+/// Wraps text between words, with an indent from the second line on.
 pub(crate) fn wrapped(text: &str, indent: usize) -> String {
     let mut lines = String::new();
     let mut column = indent;

@@ -1,16 +1,18 @@
-//! OpenEXR: every layer of the surface as numbers, one file.
+//! OpenEXR: all layers of the surface in one file.
 
 use std::io::{Error, Result, Seek, Write};
 
 use autosplats::{Camera, Frame};
 use exr::prelude::{Encoding, Image, SpecificChannels, Vec2, WritableImage as _};
 
-/// Writes the picture and the layers below it, 32 bits a channel.
+/// Writes the picture and its layers, 32 bits per channel, under OpenEXR's customary names.
 ///
-/// Names are OpenEXR's customary ones: `R G B` are linear light, `A` is 1 where there is a surface and 0 elsewhere, `Z` is
-/// the depth along the viewing axis (infinite where nothing is), `N.X N.Y N.Z` the normal in world space. `radius`,
-/// `kradius` and `curvature` are the splats', and `index` (whole numbers) says which point lies there; `u32::MAX` is
-/// none.
+/// * `R G B`: linear light.
+/// * `A`: 1 where there is a surface, else 0.
+/// * `Z`: depth along the viewing axis, infinite without a surface.
+/// * `N.X N.Y N.Z`: normal in world space.
+/// * `radius`, `kradius`, `curvature`: those of the splats.
+/// * `index`: index of the point, a whole number; `u32::MAX` for none.
 pub(crate) fn write_exr(frame: &Frame<'_>, camera: &Camera, writer: &mut (impl Write + Seek)) -> Result<()> {
     let Frame { image, layers, .. } = *frame;
     let [right, down, forward] = camera.axes().map_err(Error::other)?.map(|axis| axis.as_vec3());

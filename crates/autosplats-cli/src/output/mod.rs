@@ -1,4 +1,4 @@
-//! Outputs: checked before any work is done, written whole or not at all.
+//! Outputs: checked before any work, written completely or not at all.
 
 mod exr;
 mod png;
@@ -17,17 +17,17 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::progress::Bar;
 
-/// Files that are read, none of which an output may replace.
+/// Files that are read. No output may replace one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ReadFiles(HashSet<PathBuf>);
 
 impl ReadFiles {
-    /// Those of the files that are there.
+    /// The existing ones of `files`.
     pub(crate) fn new(files: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
         Self(files.into_iter().filter_map(|file| file.as_ref().canonicalize().ok()).collect())
     }
 
-    /// Refuses an output that would overwrite one.
+    /// Fails if the output would overwrite one of these files.
     pub(crate) fn check(&self, output: &Path) -> Result<(), Failure> {
         if output.canonicalize().is_ok_and(|target| self.0.contains(&target)) {
             return Err(Failure::usage(format!("{}: this output would overwrite an input", output.display())));
@@ -36,18 +36,18 @@ impl ReadFiles {
     }
 }
 
-/// Refuses a path that cannot be written, or that would overwrite an input.
+/// Fails if the path cannot be written, or would overwrite an input.
 pub(crate) fn check_target(path: &Path, inputs: &ReadFiles) -> Result<(), Failure> {
     let folder = folder_of(path);
     let shown = path.display();
     if path.is_dir() || path.file_name().is_none() {
-        return Err(Failure::new(Exit::Output, format!("{shown}: a folder, not a file to write")));
+        return Err(Failure::new(Exit::Output, format!("{shown}: this is a folder; name a file")));
     }
     if !folder.is_dir() {
         return Err(Failure::new(Exit::Output, format!("{shown}: there is no folder {}", folder.display())));
     }
     inputs.check(path)?;
-    // The only way to know whether a file can be made is to make one.
+    // Creating a file is the only reliable check that one can be created.
     let _writing = interrupt::writing();
     temporary_in(folder)
         .map_err(|error| cannot_write(path, &error))?
@@ -55,7 +55,7 @@ pub(crate) fn check_target(path: &Path, inputs: &ReadFiles) -> Result<(), Failur
         .map_err(|error| cannot_write(path, &error))
 }
 
-/// Writes a file through `write`; returns its size.
+/// Writes a file through `write` and returns its size in bytes.
 pub(crate) fn write_file(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<Stoppable<'_>>) -> std::io::Result<()>,
@@ -66,13 +66,13 @@ pub(crate) fn write_file(
     })
 }
 
-/// Puts a file in place whole or not at all: `fill` writes it under a temporary name in the same folder, then it is
-/// renamed. Returns its size.
+/// Replaces a file atomically and returns its size in bytes. `fill` writes to a temporary file in the same folder,
+/// which is then renamed.
 pub(crate) fn replace_file(
     path: &Path,
     fill: impl FnOnce(&mut NamedTempFile) -> Result<(), Failure>,
 ) -> Result<u64, Failure> {
-    // A link stays a link: what it points to is replaced.
+    // A symbolic link stays, and its target is replaced.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let _writing = interrupt::writing();
     let mut temporary = temporary_in(folder_of(&target)).map_err(|error| cannot_write(path, &error))?;
@@ -85,9 +85,9 @@ pub(crate) fn replace_file(
     metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error))
 }
 
-/// Writes a cloud in the format that the name tells, whole or not at all. Returns the size of the file.
+/// Writes a cloud atomically in the format of the path's extension. Returns the file's size in bytes.
 pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, quiet: bool) -> Result<u64, Failure> {
-    // A link stays a link: what it points to is replaced.
+    // A symbolic link stays, and its target is replaced.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let bar = Bar::on_file("writing", path, quiet);
     let _writing = interrupt::writing();
@@ -99,24 +99,23 @@ pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, quiet: bool) -> Resul
     }
 }
 
-/// Refuses a cloud's output whose format is not known, that exists and is not to be replaced, or that is no place to
-/// write.
+/// Fails if the cloud's output has an unknown format, exists without `force`, or cannot be written.
 pub(crate) fn check_cloud_target(path: &Path, force: bool, inputs: &ReadFiles) -> Result<(), Failure> {
     check_writable(path).map_err(Failure::usage)?;
     check_target(path, inputs)?;
     if !force && path.exists() {
-        return Err(Failure::new(Exit::Output, format!("{}: is already there; --force replaces it", path.display())));
+        return Err(Failure::new(Exit::Output, format!("{}: already exists; --force replaces it", path.display())));
     }
     Ok(())
 }
 
-/// A file that takes no more once Ctrl-C was pressed, so that a long write ends early.
+/// A file whose writes fail after Ctrl-C, so that a long write ends early.
 pub(crate) struct Stoppable<'a>(&'a mut File);
 
 impl Write for Stoppable<'_> {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         if interrupt::requested() {
-            // Not `ErrorKind::Interrupted`, which callers answer by trying again.
+            // Not `ErrorKind::Interrupted`, on which callers try again.
             return Err(std::io::Error::other("interrupted"));
         }
         self.0.write(bytes)
@@ -133,12 +132,12 @@ impl Seek for Stoppable<'_> {
     }
 }
 
-/// A line of data on standard output. Nobody reading it any more is no error.
+/// Prints a line of data on standard output. A closed pipe is no error.
 pub(crate) fn print_line(line: &str) -> Result<(), Failure> {
     print_bytes(format!("{line}\n").as_bytes())
 }
 
-/// Data on standard output. Nobody reading it any more is no error.
+/// Prints data on standard output. A closed pipe is no error.
 pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     match stdout().write_all(bytes) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
@@ -150,12 +149,12 @@ pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
 
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
     let error = error.to_string();
-    // The temporary name is nothing the caller knows.
+    // The caller does not know the temporary file's name.
     let reason = error.split(" at path ").next().unwrap_or(&error);
-    Failure::new(Exit::Output, format!("{}: cannot write it: {reason}", path.display()))
+    Failure::new(Exit::Output, format!("{}: cannot be written: {reason}", path.display()))
 }
 
-/// The folder that a file is in.
+/// Folder of a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -163,7 +162,7 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 fn temporary_in(folder: &Path) -> std::io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".autosplats-").suffix(".tmp");
-    // Temporary files are private unless told otherwise; an output is what the user's mask makes of it.
+    // By default, temporary files are private to their owner; an output should have usual permissions.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder)
@@ -176,7 +175,7 @@ pub(crate) struct Picture {
     pub(crate) format: Format,
 }
 
-/// How a picture is stored.
+/// File format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     Png,
@@ -192,7 +191,7 @@ impl Picture {
             "exr" => Format::Exr,
             _ => {
                 return Err(Failure::usage(format!(
-                    "{}: cannot tell the kind of picture; the name has to end in .png or .exr",
+                    "{}: unknown picture format; the name must end in .png or .exr",
                     path.display()
                 )));
             }

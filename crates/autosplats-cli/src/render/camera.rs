@@ -1,4 +1,4 @@
-//! Which camera the flags ask for, and where that puts the eye.
+//! The camera: from flags to a placed eye.
 
 use std::fs::read_to_string;
 use std::io::{Error, Write as _};
@@ -16,10 +16,10 @@ use crate::exit::Failure;
 use crate::output::write_file;
 use crate::values::Ortho;
 
-/// Vertical field of view of a picture that asks for none, degrees.
+/// Default vertical field of view, in degrees.
 const DEFAULT_FOV_DEG: f64 = 40.0;
 
-/// A camera still to be placed, as that may depend on the points.
+/// A camera that is placed once the points are known.
 #[derive(Debug)]
 pub(super) struct CameraJob {
     axes: Option<Axes>,
@@ -28,19 +28,19 @@ pub(super) struct CameraJob {
     place: Place,
 }
 
-/// Where the camera stands.
+/// Placement of the camera.
 #[derive(Debug)]
 enum Place {
-    /// As a file says.
+    /// The camera of a file.
     File(PathBuf, Camera),
-    /// Where the flags say; what they leave open comes from the points.
+    /// At the flags' position. Missing values come from the points.
     Eye { eye: DVec3, look_at: Option<DVec3>, up: Option<DVec3> },
-    /// So that everything is seen from a side.
+    /// Fitted so that everything is seen from a side.
     Fitted(Option<Side>),
 }
 
 impl CameraJob {
-    /// Understands the flags and reads `--camera`'s file.
+    /// Parses the flags and reads the file of `--camera`.
     pub(super) fn new(args: &CameraArgs) -> Result<Self, Failure> {
         let axes = match args.axes {
             AxesChoice::Auto => None,
@@ -56,7 +56,7 @@ impl CameraJob {
         Ok(Self { axes, fov_deg: args.fov, ortho: args.ortho, place })
     }
 
-    /// The file the camera comes from.
+    /// The file of the camera.
     pub(super) fn file(&self) -> Option<&Path> {
         match &self.place {
             Place::File(path, _) => Some(path),
@@ -64,16 +64,16 @@ impl CameraJob {
         }
     }
 
-    /// What to do where there is nothing in the picture.
+    /// Remedy for a picture that shows nothing.
     pub(super) fn remedy(&self) -> &'static str {
         match self.place {
-            Place::File(..) => "a picture without --camera",
-            Place::Eye { .. } => "a picture without --eye",
+            Place::File(..) => "rendering without --camera",
+            Place::Eye { .. } => "rendering without --eye",
             Place::Fitted(_) => "--view iso",
         }
     }
 
-    /// Places the camera before the points, and says which way is up.
+    /// Places the camera and returns it with the up axis.
     pub(super) fn place(
         &self,
         cloud: &PointCloud,
@@ -89,7 +89,7 @@ impl CameraJob {
         let mut camera = match self.place {
             Place::File(_, camera) => return Ok((camera, axes)),
             Place::Eye { eye, look_at, up } => {
-                // What has no perspective is in the middle where the points are.
+                // An orthographic camera looks at the middle of the points.
                 let middle =
                     || fitted_by(Some(Side::Iso), Projection::OrthographicHeight(1.0)).map(|fitted| fitted.look_at);
                 let look_at = look_at.map_or_else(middle, Ok)?;
@@ -105,7 +105,7 @@ impl CameraJob {
                 _ => fitted(view)?,
             },
         };
-        // What was asked for in numbers holds, whatever fits.
+        // Values stated by flags override fitted ones.
         match (self.fov_deg, self.ortho) {
             (Some(fov), _) => camera.projection = Projection::PerspectiveFovDeg(fov),
             (_, Some(Ortho(Some(height)))) => camera.projection = Projection::OrthographicHeight(height),
@@ -115,7 +115,7 @@ impl CameraJob {
         Ok((camera, axes))
     }
 
-    /// What the flags ask for; heights that are to be fitted are 1.
+    /// Projection of the flags. A height that is still to be fitted is 1.
     fn projection(&self) -> Projection {
         match self.ortho {
             Some(Ortho(height)) => Projection::OrthographicHeight(height.unwrap_or(1.0)),
@@ -124,7 +124,7 @@ impl CameraJob {
     }
 }
 
-/// The camera a scene was made for.
+/// The camera of a scene.
 pub(crate) fn scene_camera(scene: &Scene) -> Camera {
     let View { eye, look_at, up, fov_degrees } = scene.view();
     Camera { eye, look_at, up, projection: Projection::PerspectiveFovDeg(fov_degrees) }
@@ -143,7 +143,7 @@ fn direction(side: Option<Side>) -> ViewDirection {
     }
 }
 
-/// What is up in a picture taken along `sight`: the axes' own up, or their ahead where that is the line of sight.
+/// Up direction of a picture along `sight`: the axes' up, or their forward direction if up is along the line of sight.
 fn upward(axes: Axes, sight: DVec3) -> DVec3 {
     let (up, ahead) = match axes {
         Axes::ZUp => (DVec3::Z, DVec3::Y),
@@ -158,16 +158,16 @@ fn load(path: &Path) -> Result<Camera, Failure> {
     let text = read_to_string(path).map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
     let camera: Camera = serde_json::from_str(&text).map_err(|error| {
         let why = match error.classify() {
-            Category::Data => "eye, look_at and up are three numbers each, projection is one that --save-camera writes",
-            _ => "this is no JSON; --save-camera writes such a file",
+            Category::Data => "eye, look_at and up must be three numbers each, projection as --save-camera writes it",
+            _ => "not JSON; --save-camera writes a camera file",
         };
-        Failure::usage(format!("{shown}, line {}, column {}: no camera: {why}", error.line(), error.column()))
+        Failure::usage(format!("{shown}, line {}, column {}: not a camera: {why}", error.line(), error.column()))
     })?;
     camera.check().map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
     Ok(camera)
 }
 
-/// Writes a camera as JSON; returns the size of the file.
+/// Writes a camera as JSON and returns the file's size in bytes.
 pub(super) fn save(path: &Path, camera: &Camera) -> Result<u64, Failure> {
     write_file(path, |writer| {
         serde_json::to_writer_pretty(&mut *writer, camera).map_err(Error::other)?;

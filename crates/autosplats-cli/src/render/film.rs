@@ -1,4 +1,4 @@
-//! A picture for each frame of what moves, as numbered files or as a film.
+//! Pictures of frames, as numbered files or as a film.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -19,7 +19,7 @@ use crate::output::check_target;
 use crate::progress::{Bar, Notes};
 use crate::values::FrameRange;
 
-/// Frames to render, and where to.
+/// Frames to render, and their target.
 #[derive(Debug)]
 pub(super) struct FilmJob {
     pub(super) target: Target,
@@ -31,7 +31,7 @@ pub(super) struct FilmJob {
 }
 
 impl FilmJob {
-    /// What the flags ask for, if they ask for frames.
+    /// The job of the flags; `None` if they ask for no frames.
     pub(super) fn new(
         outputs: &[PathBuf],
         frames: Option<FrameRange>,
@@ -49,7 +49,7 @@ impl FilmJob {
         }
         let [output] = outputs else {
             return Err(Failure::usage(
-                "--out: frames go to one film, or to one name with a number such as f_%05d.png",
+                "--out: frames need one film, or one name with a number such as f_%05d.png",
             ));
         };
         let all = FrameRange { first: 0, last: None };
@@ -58,18 +58,18 @@ impl FilmJob {
         let target = if is_one { Target::one(output) } else { Target::new(output) }.map_err(Failure::usage)?;
         if matches!(target, Target::Film(_)) {
             if resume {
-                return Err(Failure::usage("--resume: a film is made in one go; have pictures written as f_%05d.png"));
+                return Err(Failure::usage("--resume: a film cannot be resumed; write pictures as f_%05d.png"));
             }
             if !has_ffmpeg() {
                 let error =
-                    "ffmpeg is not there, which makes films; install it, or have pictures written as f_%05d.png";
+                    "films need ffmpeg, which is not installed; install it, or write pictures as f_%05d.png";
                 return Err(Failure::usage(format!("{}: {error}", output.display())));
             }
         }
         Ok(Some(Self { target, frames, resume, fps, watch }))
     }
 
-    /// A file that is going to be written.
+    /// The first file that is written.
     pub(super) fn first_file(&self) -> PathBuf {
         self.file(self.frames.first).unwrap_or_else(|| match &self.target {
             Target::Film(path) => path.clone(),
@@ -77,7 +77,7 @@ impl FilmJob {
         })
     }
 
-    /// The file of a picture; a film's pictures have none.
+    /// The file of a frame's picture; `None` for a film.
     pub(super) fn file(&self, frame: usize) -> Option<PathBuf> {
         match &self.target {
             Target::Film(_) => None,
@@ -85,14 +85,14 @@ impl FilmJob {
         }
     }
 
-    /// How pictures of a job are written.
+    /// How to write pictures of a job.
     pub(super) fn style(&self, job: &Job, rate: f64) -> Style {
         let (target, size, alpha, json) = (self.target.clone(), job.size, job.transparent(), job.json);
         Style { target, size, rate, alpha, json, inputs: job.read_files.clone() }
     }
 }
 
-/// Renders the frames that are asked for.
+/// Renders the requested frames.
 pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device: &Device) -> Result<(), Failure> {
     if film.watch {
         job.inputs.check_watched(film.file(0).as_deref())?;
@@ -105,7 +105,7 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
         for Playing { name, begins, .. } in &playing {
             if let Some(begins) = begins.filter(|begins| !begins.is_zero()) {
                 eprintln!(
-                    "note: {name}: begins {:.3} s after the first recorded at the same time, by its stamps",
+                    "note: {name}: begins {:.3} s after the first input, by its time stamps",
                     begins.as_secs_f64()
                 );
             }
@@ -169,7 +169,7 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
             let seconds = scene.times[frame] as f64 / 1e9;
             let report = FrameReport { frame, seconds, path, pictures, counts, read_ms, timings_ms };
             if !writer.put(Shot { image: picture(job, &rendered, &writer), report }) {
-                // The writer has given up and says why.
+                // The writer has failed and reports why.
                 return Ok(());
             }
             tally.written += pictures.unwrap_or(1);
@@ -182,29 +182,29 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
     rendered.and(written)?;
     drop(bar);
     if !job.quiet {
-        let kept = if tally.kept > 0 { format!(", {} were there", tally.kept) } else { String::new() };
+        let kept = if tally.kept > 0 { format!(", {} existed", tally.kept) } else { String::new() };
         tally.summarize(film, &kept, begun, device);
     }
     Ok(())
 }
 
-/// The picture that is written of what was rendered.
+/// The picture to write of a rendered frame.
 pub(super) fn picture(job: &Job, frame: &Frame<'_>, writer: &Writer) -> autosplats::Image {
     if job.supersample > 1 { frame.image.averaged(job.supersample) } else { writer.copy(frame.image) }
 }
 
-/// What became of the frames.
+/// Counts of rendered and skipped frames.
 #[derive(Default)]
 pub(super) struct Tally {
     pub(super) written: usize,
     pub(super) kept: usize,
     milliseconds: f64,
-    /// Frames that show nothing, and the first of them.
+    /// Number of frames that show nothing, and the first of them.
     empty: Option<(usize, usize)>,
 }
 
 impl Tally {
-    /// Counts what was rendered of a frame.
+    /// Counts a rendered frame.
     pub(super) fn count(&mut self, frame: usize, rendered: &Frame<'_>) {
         self.milliseconds += rendered.timings.frame;
         if rendered.counts.covered == 0 {
@@ -213,7 +213,7 @@ impl Tally {
         }
     }
 
-    /// One line on standard error.
+    /// Prints the summary on standard error.
     pub(super) fn summarize(&self, film: &FilmJob, more: &str, begun: Instant, device: &Device) {
         let place = match &film.target {
             Target::Film(path) => path.clone(),
@@ -221,7 +221,7 @@ impl Tally {
         };
         match self.empty {
             Some((1, frame)) => eprintln!("note: frame {frame} shows nothing"),
-            Some((count, first)) => eprintln!("note: {count} frames show nothing, the first of them {first}"),
+            Some((count, first)) => eprintln!("note: {count} frames show nothing, the first is frame {first}"),
             None => {}
         }
         eprintln!(

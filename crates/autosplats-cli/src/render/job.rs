@@ -1,4 +1,4 @@
-//! What the flags of `render` mean together, checked before any work is done.
+//! The job of `render`: its flags combined and checked before any work.
 
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -21,19 +21,19 @@ use crate::output::{Format, Picture, ReadFiles, check_target};
 use crate::threads::start_threads;
 use crate::values::COLOR_MODES;
 
-/// A picture to make: everything known but the points.
+/// A picture to render: everything except the points.
 #[derive(Debug)]
 pub(super) struct Job {
     pub(super) inputs: Inputs,
     pub(super) pictures: Vec<Picture>,
     pub(super) save_camera: Option<PathBuf>,
-    /// None of which is overwritten.
+    /// Input files, which must not be overwritten.
     pub(super) read_files: ReadFiles,
-    /// Of the pictures that are written.
+    /// Size of the written pictures in pixels.
     pub(super) size: [u32; 2],
-    /// How many times as wide and high they are rendered.
+    /// Factor on both sides of the rendered picture, which is then averaged down.
     pub(super) supersample: u32,
-    /// Whether it is so because nothing else was asked for.
+    /// Whether the factor is the default.
     pub(super) supersample_is_usual: bool,
     pub(super) camera: CameraJob,
     pub(super) settings: Settings,
@@ -44,8 +44,7 @@ pub(super) struct Job {
 }
 
 impl Job {
-    /// Checks the flags, the inputs' existence and the outputs' places. Where frames are asked for, they are in place of the
-    /// pictures.
+    /// Checks flags, inputs and output paths. A film job, if frames are requested, replaces the single pictures.
     pub(super) fn new(args: RenderArgs) -> Result<(Self, Option<FilmJob>), Failure> {
         let RenderArgs {
             inputs,
@@ -75,12 +74,12 @@ impl Job {
         let supersample = supersample.unwrap_or(if is_still { still_supersample(size) } else { 1 });
         if needs_layers && supersample > 1 {
             return Err(Failure::usage(
-                "--supersample: .exr layers are not averaged; write them in a run of their own",
+                "--supersample: .exr layers cannot be averaged; write them in a separate run",
             ));
         }
         if resume && surface.frames_averaged > 1 {
             return Err(Failure::usage(
-                "--resume: with --frames-averaged a frame depends on those before; render all of them anew",
+                "--resume: with --frames-averaged a frame depends on earlier ones; render all frames again",
             ));
         }
         let settings = settings(&surface, look, needs_layers);
@@ -102,7 +101,7 @@ impl Job {
         let [width, height] = size.map(|side| u64::from(side) * u64::from(supersample));
         if width.max(height) > u64::from(MAX_SIDE) {
             return Err(Failure::usage(format!(
-                "--supersample {supersample} renders {width}x{height}, and pictures have at most {MAX_SIDE} pixels a side"
+                "--supersample {supersample}: {width}x{height} pixels are too many, each side may have {MAX_SIDE}"
             )));
         }
         check_memory(&format!("a picture of {width}x{height}"), width * height * BYTES_PER_PIXEL)
@@ -112,7 +111,7 @@ impl Job {
         let shading = &settings.shading;
         let is_scaled = shading.legend || shading.range.is_some();
         if !quiet && is_scaled && shading.color.usual_map().is_none() {
-            eprintln!("note: --legend and --range are for colours that tell a value, as of --color height; not used");
+            eprintln!("note: --legend and --range are ignored; they need colours of a value, such as --color height");
         }
         let job = Self {
             inputs,
@@ -132,12 +131,12 @@ impl Job {
         Ok((job, film))
     }
 
-    /// Pixels of the picture that is rendered.
+    /// Size of the rendered picture in pixels, before averaging.
     pub(super) fn rendered_size(&self) -> [u32; 2] {
         self.size.map(|side| side * self.supersample)
     }
 
-    /// Tries out what the kd-tree search is to begin with, if that is what was asked for.
+    /// Finds the best first radius of the kd-tree search by trials, if it was asked for.
     pub(super) fn settle_first_radius(
         &mut self,
         renderer: &mut Renderer,
@@ -149,7 +148,7 @@ impl Job {
         Ok(())
     }
 
-    /// Renders points, of which there may be few or none.
+    /// Renders a cloud of any number of points, also none.
     pub(super) fn render<'a>(
         &self,
         renderer: &'a mut Renderer,
@@ -158,20 +157,20 @@ impl Job {
     ) -> Result<Frame<'a>, Failure> {
         let mut settings = self.settings.clone();
         if cloud.is_empty() {
-            // No points have no colours either, and show the background.
+            // An empty cloud has no colours; the picture shows the background.
             settings.shading.color = ColorMode::Plain;
         }
         settings.reconstruction.k = settings.reconstruction.k.min(cloud.len().saturating_sub(1).max(1) as u32);
         renderer.render(cloud, camera, self.rendered_size(), &settings).map_err(render_failure)
     }
 
-    /// Whether the picture has nothing behind the surface.
+    /// Whether the background is transparent.
     pub(super) fn transparent(&self) -> bool {
         self.settings.shading.background == Background::Transparent
     }
 
-    /// Lowers k to the neighbours that a small cloud has, with a note of it, and refuses one that has none. With `auto` those are
-    /// dots.
+    /// Lowers k to the number of neighbours in a small cloud and returns a note. Fails for a single point. With `auto`,
+    /// small clouds are dots.
     pub(super) fn fit_neighbors(&mut self, cloud: &PointCloud) -> Result<Option<String>, Failure> {
         let Reconstruction { k, adaptive, .. } = &mut self.settings.reconstruction;
         match cloud.len() {
@@ -179,13 +178,13 @@ impl Job {
             0 | 1 => Err(Failure::new(Exit::Input, format!("{}: one point makes no surface", self.inputs.names()))),
             points if points <= *k as usize => {
                 let wanted = std::mem::replace(k, points as u32 - 1);
-                Ok(Some(format!("{points} points cannot have {wanted} neighbours each; {k} are taken")))
+                Ok(Some(format!("{points} points cannot have {wanted} neighbours each; using {k}")))
             }
             _ => Ok(None),
         }
     }
 
-    /// Settles how bright colours are shown by these points, and says so if it is brighter than they are.
+    /// Sets the exposure from these points if no flag states it, with a note if colours get brighter.
     pub(super) fn settle_exposure(&mut self, cloud: &PointCloud) {
         let shading = &mut self.settings.shading;
         if shading.exposure.is_some() {
@@ -194,13 +193,13 @@ impl Job {
         let exposure = usual_exposure(cloud);
         shading.exposure = Some(exposure);
         let shown = shading.lighting && matches!(shading.color, ColorMode::Auto | ColorMode::Rgb);
-        // Less cannot be seen.
+        // Smaller factors are invisible.
         if shown && exposure >= 1.05 && !self.quiet {
-            eprintln!("note: dark colours are shown {exposure:.1} times as bright; --exposure 1 leaves them");
+            eprintln!("note: dark colours are shown {exposure:.1} times as bright; --exposure 1 keeps them dark");
         }
     }
 
-    /// Refuses a colour mode that the points do not have what it needs for.
+    /// Fails if the points lack the colours or the field of the colour mode.
     pub(super) fn check_color(&self, cloud: &PointCloud) -> Result<(), Failure> {
         let fields = || cloud.fields().iter().map(|field| field.name.as_str());
         let missing = match &self.settings.shading.color {
@@ -217,7 +216,7 @@ impl Job {
         let is_channel = ["red", "green", "blue"].contains(&&*missing.to_lowercase());
         if is_channel && cloud.colors().is_some() {
             return Err(Failure::usage(format!(
-                "--color {missing}: the points' colours are shown together: --color rgb"
+                "--color {missing}: colour channels are shown together; use --color rgb"
             )));
         }
         let hint =

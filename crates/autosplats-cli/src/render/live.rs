@@ -1,4 +1,4 @@
-//! A picture for each update of what is live, as it comes, until it ends.
+//! Pictures of live input: one per update as it comes, until the input ends.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,10 +19,10 @@ use crate::interrupt;
 use crate::output::check_target;
 use crate::progress::{Bar, Notes};
 
-/// How long one of the streams is listened to before the next one is.
+/// Time to listen to one stream before the next.
 const TURN: Duration = Duration::from_millis(20);
 
-/// Renders what comes until the streams have ended, there are as many pictures as are wanted, or Ctrl-C is pressed.
+/// Renders updates until the streams end, the requested number of pictures is reached, or Ctrl-C is pressed.
 pub(super) fn run(
     job: &mut Job,
     film: &FilmJob,
@@ -32,14 +32,14 @@ pub(super) fn run(
 ) -> Result<(), Failure> {
     if film.resume {
         let name = job.inputs.names();
-        return Err(Failure::usage(format!("--resume: {name} is live, so that no picture of it can be made again")));
+        return Err(Failure::usage(format!("--resume: {name} is live, and its earlier frames do not come again")));
     }
-    let bar = Bar::spinner("rendering what comes", job.quiet);
+    let bar = Bar::spinner("rendering live input", job.quiet);
     let mut streams = Streams::new(playing, &bar)?;
-    // What is there by then is kept, a film as well.
+    // Pictures rendered so far are kept, also as a film.
     interrupt::end_gently();
     let rate = film.fps.unwrap_or(schedule::USUAL_RATE);
-    // A pipe gives its frames as fast as they are taken, so that times of arrival may say nothing.
+    // A pipe's frames come as fast as they are read, so arrival times may be meaningless.
     let evenly = film.fps.is_some() && job.inputs.come_by_pipe() && !film.watch;
     let begun = Instant::now();
     let mut tally = Tally::default();
@@ -47,14 +47,14 @@ pub(super) fn run(
     let (mut first_frame, mut frame): (Option<First>, usize) = (None, 0);
     let writer = Writer::start(film.style(job, rate));
     let is_film = matches!(film.target, Target::Film(_));
-    // The last picture of a film is shown until the next one comes, and nobody knows yet when that will be.
+    // The film shows the last picture until the next one comes, at a time that is still unknown.
     let mut shown: Option<Shot> = None;
     let mut render_all = || {
         while !interrupt::ending() && film.frames.last.is_none_or(|last| frame <= last) {
             let waited = Instant::now();
             let Some(cloud) = streams.next(&mut place)? else { break };
             if cloud.len() < 2 && first_frame.is_none() || frame < film.frames.first {
-                // Nothing to place a camera before, or not asked for.
+                // There is nothing to place a camera for, or the frame is not requested.
                 frame += usize::from(frame < film.frames.first && !cloud.is_empty());
                 continue;
             }
@@ -83,7 +83,7 @@ pub(super) fn run(
             if let Some(shot) = shot
                 && !hand_over(shot, is_film.then_some(seconds), rate, &mut tally, &writer)
             {
-                // The writer has given up and says why.
+                // The writer has failed and reports why.
                 return Ok(());
             }
             frame += 1;
@@ -94,7 +94,7 @@ pub(super) fn run(
     if let (Some(shot), Some(first)) = (shown.take(), &first_frame) {
         hand_over(shot, Some(first.seconds_until(frame)), rate, &mut tally, &writer);
     }
-    // What cannot be shown of what comes later takes nothing from what was.
+    // A later failure keeps the pictures written so far.
     let written = writer.finish(tally.written > 0);
     rendered.and(written)?;
     let Statistics { dropped, refused, last_refusal, waiting, .. } = streams.statistics();
@@ -105,27 +105,27 @@ pub(super) fn run(
             return Err(Failure::interrupted());
         }
         let why = waiting.or(last_refusal).map_or_else(String::new, |why| format!(": {why}"));
-        return Err(Failure::new(Exit::Input, format!("{}: nothing came that has points{why}", job.inputs.names())));
+        return Err(Failure::new(Exit::Input, format!("{}: no points came{why}", job.inputs.names())));
     }
     if !job.quiet {
         let of = |count: u64, what: &str| if count > 0 { format!(", {count} {what}") } else { String::new() };
-        let more = of(dropped, "updates dropped for newer ones") + &of(refused, "refused");
+        let more = of(dropped, "updates skipped for newer ones") + &of(refused, "refused");
         tally.summarize(film, &more, begun, device);
     }
     Ok(())
 }
 
-/// The first frame that is rendered.
+/// The first rendered frame.
 struct First {
     frame: usize,
     came: Instant,
     camera: Camera,
-    /// Of frames that are evenly apart, by their number.
+    /// Frames per second of evenly spaced frames; `None` takes arrival times.
     rate: Option<f64>,
 }
 
 impl First {
-    /// From the first frame to one that comes now.
+    /// Seconds from the first frame to this one, which comes now.
     fn seconds_until(&self, frame: usize) -> f64 {
         match self.rate {
             Some(rate) => (frame - self.frame) as f64 / rate,
@@ -134,8 +134,8 @@ impl First {
     }
 }
 
-/// Has a picture written; a film shows it until so many seconds after its first one, and once at least. Says whether it will be
-/// written.
+/// Hands a picture to the writer and returns whether it will be written. A film shows the picture until `until` seconds
+/// after the first, at least once.
 fn hand_over(mut shot: Shot, until: Option<f64>, rate: f64, tally: &mut Tally, writer: &Writer) -> bool {
     if let Some(until) = until {
         let pictures = ((until * rate).round() as usize).saturating_sub(tally.written).max(1);
@@ -145,7 +145,7 @@ fn hand_over(mut shot: Shot, until: Option<f64>, rate: f64, tally: &mut Tally, w
     writer.put(shot)
 }
 
-/// Inputs some of which are live; the others stand still.
+/// Inputs of which some are live; the others are static.
 struct Streams<'a> {
     inputs: Vec<Stream<'a>>,
 }
@@ -153,10 +153,10 @@ struct Streams<'a> {
 struct Stream<'a> {
     input: Playing,
     notes: Notes<'a>,
-    /// What it shows now.
+    /// Points currently shown.
     cloud: Option<Arc<PointCloud>>,
     ended: bool,
-    /// What it said last of why nothing comes.
+    /// Last stated reason why nothing comes.
     waiting: Option<String>,
 }
 
@@ -167,7 +167,7 @@ impl<'a> Streams<'a> {
             let (mut cloud, mut ended) = (None, false);
             if input.player.stream().timeline().is_some() {
                 if input.moves {
-                    let why = "plays by a timeline of its own, which cannot be shown beside what is live";
+                    let why = "has its own timeline and cannot be shown together with live input";
                     return Err(Failure::usage(format!("{} {why}", input.name)));
                 }
                 (cloud, ended) = (Some(input.player.frame(0, &notes).map_err(read_failure)?), true);
@@ -177,7 +177,7 @@ impl<'a> Streams<'a> {
         Ok(Self { inputs: playing.into_iter().map(open).collect::<Result<_, _>>()? })
     }
 
-    /// What is seen once something has come; `None` when all have ended or Ctrl-C was pressed.
+    /// Waits for an update and returns all current points; `None` if all streams ended or Ctrl-C was pressed.
     fn next(&mut self, place: &mut Place) -> Result<Option<Arc<PointCloud>>, Failure> {
         while !interrupt::ending() && self.inputs.iter().any(|stream| !stream.ended) {
             let mut news = false;
@@ -193,7 +193,7 @@ impl<'a> Streams<'a> {
         Ok(None)
     }
 
-    /// Of all of them together.
+    /// Sum over all streams.
     fn statistics(&self) -> Statistics {
         self.inputs.iter().map(|stream| stream.player().stream().statistics()).fold(
             Statistics::default(),
@@ -213,7 +213,7 @@ impl Stream<'_> {
         &self.input.player
     }
 
-    /// Takes what has come; says whether anything has.
+    /// Takes a new update and returns whether there was one.
     fn listen(&mut self) -> Result<bool, Failure> {
         match self.input.player.next(TURN, &self.notes) {
             Ok(Some(cloud)) => {
@@ -221,7 +221,7 @@ impl Stream<'_> {
                 return Ok(true);
             }
             Ok(None) => {}
-            // That is how it says that there will be no more.
+            // This error means that no further frames will come.
             Err(Error::NoFrames { .. }) => self.ended = true,
             Err(error) => return Err(read_failure(error)),
         }

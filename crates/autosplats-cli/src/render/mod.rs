@@ -1,4 +1,4 @@
-//! `autosplats render`: read, look, draw, write, say what happened.
+//! `autosplats render`: renders inputs to pictures, layers or a film.
 
 mod camera;
 mod film;
@@ -23,10 +23,10 @@ use crate::exit::{Exit, Failure};
 use crate::output::{Format, Picture, print_line, write_exr, write_file, write_png};
 use crate::progress::Bar;
 
-/// Renders one picture to one file or several, or a picture for each frame of what moves.
+/// Renders one picture to one or several files, or a picture per frame of moving input.
 pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let (mut job, film) = Job::new(args)?;
-    // A device that is not there says so before anything is read.
+    // A missing device fails before anything is read.
     let mut renderer = Renderer::with_backend(job.backend).map_err(render_failure)?;
     renderer.check(&job.settings).map_err(render_failure)?;
     let device = Device::of(&renderer);
@@ -48,13 +48,13 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     job.settle_first_radius(&mut renderer, &cloud, &camera)?;
     let mut notes = Vec::new();
     if degrees {
-        notes.push("degrees are shown as metres about the middle of the points, east, north and up".to_owned());
+        notes.push("coordinates in degrees are shown in metres east, north and up of the points' middle".to_owned());
     }
     notes.extend(fewer);
     let placed = Placed { camera, axes, read, notes };
     let bar = Bar::spinner("rendering", job.quiet);
     match job.render(&mut renderer, &cloud, &camera) {
-        // A device may have no room for what is rendered larger than asked for.
+        // A device may lack the memory for supersampling by default; the picture is then rendered without.
         Err(failure) if failure.exit == Exit::Memory && job.supersample > 1 && job.supersample_is_usual => {}
         frame => return placed.conclude(&job, &device, bar, frame?),
     }
@@ -63,18 +63,18 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     placed.conclude(&job, &device, bar, frame)
 }
 
-/// What is known of a picture before it is rendered.
+/// Facts known before a picture is rendered.
 struct Placed {
     camera: Camera,
     axes: Axes,
-    /// Milliseconds that reading took.
+    /// Reading time in milliseconds.
     read: f64,
-    /// What is to be said of the points.
+    /// Notes on the points.
     notes: Vec<String>,
 }
 
 impl Placed {
-    /// Writes the picture that was rendered and says what happened; ends the progress of rendering.
+    /// Ends the progress bar of rendering, writes the picture and prints the summary.
     fn conclude(self, job: &Job, device: &Device, bar: Bar, frame: Frame<'_>) -> Result<(), Failure> {
         let Self { camera, axes, read, notes } = self;
         drop(bar);
@@ -114,7 +114,7 @@ fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, job: &Jo
     })
 }
 
-/// Refuses a picture without a surface.
+/// Fails if the picture shows no surface.
 fn check_visible(frame: &Frame<'_>, job: &Job) -> Result<(), Failure> {
     if frame.counts.covered > 0 {
         return Ok(());
@@ -125,14 +125,14 @@ fn check_visible(frame: &Frame<'_>, job: &Job) -> Result<(), Failure> {
     } else {
         format!(
             "of {points} points {not_finite} have no finite position, {behind} are behind the eye, {outside} outside the \
-             picture; {} finds the rest",
+             picture; try {}",
             job.camera.remedy()
         )
     };
     Err(Failure::new(Exit::Input, format!("{}: nothing to show: {why}", job.inputs.names())))
 }
 
-/// What failing to render is to the caller of the program.
+/// The failure with the exit code of a render error.
 pub(crate) fn render_failure(error: Error) -> Failure {
     match error {
         Error::Setting { name, value, range } => {
@@ -148,7 +148,7 @@ pub(crate) fn render_failure(error: Error) -> Failure {
     }
 }
 
-/// The flag that sets a field of the settings.
+/// Flag of a field of the settings.
 fn flag(setting: &str) -> String {
     match setting {
         "k" => "-k".into(),

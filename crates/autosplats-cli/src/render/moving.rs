@@ -1,4 +1,4 @@
-//! The inputs as they are at each frame.
+//! Inputs with timelines: the points at each frame.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -13,13 +13,13 @@ use crate::exit::{Exit, Failure};
 use crate::input::{Playing, read_failure};
 use crate::progress::Bar;
 
-/// Frames that the camera is placed by.
+/// Most frames that the camera is placed by.
 const PLACED_BY: usize = 5;
 
-/// Inputs with timelines.
+/// Inputs with timelines, played together.
 pub(super) struct Moving {
     playing: Vec<Playing>,
-    /// Nanoseconds since all begin at which something changes.
+    /// Times at which something changes, in nanoseconds since the common start.
     pub(super) times: Vec<i64>,
     place: Place,
     /// Names of the inputs, for messages.
@@ -53,15 +53,14 @@ impl Moving {
         let mut parts: Vec<(Arc<PointCloud>, DMat4)> = Vec::new();
         for Playing { player, begins, world_from_input, .. } in &mut self.playing {
             let at = |timeline: &Timeline| timeline.frame_at(time.saturating_sub(begins.unwrap_or_default()));
-            // Frames of one input may be of the same time.
+            // Frames of a single input may share a time, so its frames are taken by number.
             let own = if single { frame } else { player.stream().timeline().map_or(0, at) };
             parts.push((player.frame(own, progress).map_err(read_failure)?, *world_from_input));
         }
         Ok(self.place.merge(parts))
     }
 
-    /// Places the camera so that it sees what there is from the first frame to the last, and settles for all of them what
-    /// follows from the points.
+    /// Places the camera so that it sees all frames, and fixes the settings that depend on the points.
     pub(super) fn settle(
         &mut self,
         job: &mut Job,
@@ -88,23 +87,23 @@ impl Moving {
         self.place.settle(job, renderer, &all, first)
     }
 
-    /// The points at a frame, as they are rendered.
+    /// The points at a frame, ready for rendering.
     pub(super) fn frame(&mut self, frame: usize, progress: &dyn Progress) -> Result<Arc<PointCloud>, Failure> {
         let cloud = self.points(frame, progress)?;
         Ok(self.place.upright(cloud))
     }
 }
 
-/// What is known of the place that points are in, once there are some, and is the same in all pictures.
+/// Conversion to metres and up axis, fixed by the first points so that all pictures share them.
 #[derive(Default)]
 pub(super) struct Place {
-    /// The map of what is in degrees.
+    /// Conversion of degrees to metres.
     metres: Option<LocalMetres>,
     axes: Option<Axes>,
 }
 
 impl Place {
-    /// Puts inputs with their poses together.
+    /// Merges inputs with their poses.
     pub(super) fn merge(&mut self, mut parts: Vec<(Arc<PointCloud>, DMat4)>) -> Arc<PointCloud> {
         let mut cloud = match parts.pop() {
             Some((only, pose)) if parts.is_empty() && pose == DMat4::IDENTITY => only,
@@ -124,8 +123,8 @@ impl Place {
         cloud
     }
 
-    /// Places the camera before `all` points, and settles by the `first` ones what is to be the same in all pictures: exposure,
-    /// the range of a colour map, so that colours mean the same, and the first radius of the kd-tree.
+    /// Places the camera for `all` points. Fixes by the `first` points what all pictures must share: exposure, range of
+    /// the colour map and first radius of the kd-tree.
     pub(super) fn settle(
         &mut self,
         job: &mut Job,
@@ -141,7 +140,7 @@ impl Place {
         job.settle_first_radius(renderer, &first, &camera)?;
         let plain = matches!(job.settings.shading.color, ColorMode::Plain | ColorMode::Rgb | ColorMode::Normal);
         if job.settings.shading.range.is_none() && !plain {
-            // No frame is to be averaged with this one.
+            // No later frame may be averaged with this trial.
             let averaged = std::mem::replace(&mut job.settings.reconstruction.frames_averaged, 1);
             let range = job.render(renderer, &first, &camera)?.counts.value_range;
             job.settings.reconstruction.frames_averaged = averaged;
@@ -151,12 +150,12 @@ impl Place {
         Ok(camera)
     }
 
-    /// The points with what is known to be up.
+    /// The points with the shared up axis.
     pub(super) fn upright(&self, mut cloud: Arc<PointCloud>) -> Arc<PointCloud> {
         if let Some(axes) = self.axes
             && cloud.axes() != Some(axes)
         {
-            // Others have it as well: this is a copy.
+            // Other owners of the cloud keep theirs; this is a copy.
             cloud = Arc::new(Arc::unwrap_or_clone(cloud).with_axes(axes));
         }
         cloud

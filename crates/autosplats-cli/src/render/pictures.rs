@@ -1,4 +1,4 @@
-//! Pictures that wait to be written, and the thread that writes them.
+//! The thread that writes pictures, and its queue.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
@@ -12,7 +12,7 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{ReadFiles, print_line, write_file, write_png};
 
-/// Pictures that wait.
+/// Most pictures in the queue.
 const QUEUE: usize = 2;
 
 /// How and where pictures are written.
@@ -20,16 +20,16 @@ const QUEUE: usize = 2;
 pub(super) struct Style {
     pub(super) target: Target,
     pub(super) size: [u32; 2],
-    /// Pictures a second of a film.
+    /// Pictures per second of a film.
     pub(super) rate: f64,
     pub(super) alpha: bool,
-    /// Whether a line is told of each.
+    /// Whether to print a JSON line per picture.
     pub(super) json: bool,
-    /// None of them is replaced.
+    /// Input files, which must not be replaced.
     pub(super) inputs: ReadFiles,
 }
 
-/// A picture, and what is told of it once it is in place.
+/// A picture, and the report that is printed once it is written.
 #[derive(Debug)]
 pub(super) struct Shot {
     pub(super) image: Image,
@@ -40,25 +40,25 @@ pub(super) struct Shot {
 #[derive(Debug, Serialize)]
 pub(super) struct FrameReport {
     pub(super) frame: usize,
-    /// Since the first frame.
+    /// Seconds since the first frame.
     pub(super) seconds: f64,
-    /// Of a picture that is a file.
+    /// File of the picture; none for a film.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) path: Option<PathBuf>,
-    /// How many pictures of a film show it.
+    /// Number of a film's pictures that show this frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) pictures: Option<usize>,
     pub(super) counts: Counts,
-    /// Of what is live, waiting for it as well.
+    /// Reading time in milliseconds, including the wait for live input.
     pub(super) read_ms: f64,
     pub(super) timings_ms: Timings,
 }
 
-/// The thread that writes pictures, in the order they are handed over.
+/// Thread that writes pictures in the order of their arrival.
 pub(super) struct Writer {
-    /// `None` says that all have come.
+    /// Pictures to write; `None` marks the end.
     queue: SyncSender<Option<Shot>>,
-    /// What was written and is of use again: memory that is new each time costs a millisecond a picture.
+    /// Written images, whose memory is used again: fresh memory is slow.
     spare: Receiver<Image>,
     thread: JoinHandle<Result<(), Failure>>,
 }
@@ -74,7 +74,7 @@ impl Writer {
         Self { queue, spare, thread }
     }
 
-    /// A copy of a picture, in memory that was used before if there is any.
+    /// Copies a picture, into used memory if there is any.
     pub(super) fn copy(&self, image: &Image) -> Image {
         let mut copy = self.spare.try_recv().unwrap_or_default();
         (copy.width, copy.height) = (image.width, image.height);
@@ -83,19 +83,19 @@ impl Writer {
         copy
     }
 
-    /// Hands over a picture; says whether it will be written. If not, [`finish`](Self::finish) says why.
+    /// Queues a picture and returns whether it will be written. If not, [`finish`](Self::finish) returns the reason.
     pub(super) fn put(&self, shot: Shot) -> bool {
         self.queue.send(Some(shot)).is_ok()
     }
 
-    /// Waits until all is in place. A film that is not `complete` is not.
+    /// Waits until everything is written. A film that is not `complete` is discarded.
     pub(super) fn finish(self, complete: bool) -> Result<(), Failure> {
         if complete {
-            // Whoever does not hear it has failed.
+            // A closed queue means that the thread has failed; joining it returns the reason.
             let _ = self.queue.send(None);
         }
         drop(self.queue);
-        self.thread.join().unwrap_or_else(|_| Err(Failure::new(Exit::Output, "writing the pictures failed")))
+        self.thread.join().unwrap_or_else(|_| Err(Failure::new(Exit::Output, "writing the pictures failed, which is a bug in this program")))
     }
 }
 
@@ -112,7 +112,7 @@ fn write_frames(
         if style.json {
             tell(&report)?;
         }
-        // Nobody may want it any more.
+        // The renderer may have ended already.
         let _ = written.send(image);
     }
     Ok(())
@@ -126,7 +126,7 @@ fn write_film(
 ) -> Result<(), Failure> {
     let mut reports = Vec::new();
     {
-        // What is there of the film is gone before Ctrl-C ends the program.
+        // The lock makes Ctrl-C wait until the partial film is removed.
         let _writing = interrupt::writing();
         let mut film = Film::begin(path, style.size, style.rate).map_err(film_failure)?;
         let mut complete = false;
@@ -147,12 +147,12 @@ fn write_film(
             return Err(Failure::interrupted());
         }
         if !complete {
-            // Whoever has sent too few says why.
+            // The sender reports why pictures are missing.
             return Ok(());
         }
         film.finish().map_err(film_failure)?;
     }
-    // Only now is there something to tell of.
+    // The film exists only now, so its frames are reported only now.
     reports.iter().try_for_each(tell)
 }
 

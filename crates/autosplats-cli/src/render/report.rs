@@ -1,4 +1,4 @@
-//! What a render says when it is done: JSON for machines, one line for people.
+//! Report of a rendered picture: JSON for programs, one line for people.
 
 use std::path::PathBuf;
 
@@ -10,12 +10,12 @@ use super::job::Job;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
 
-/// Everything `--json` prints.
+/// The object that `--json` prints.
 #[derive(Debug, Serialize)]
 pub(super) struct Report<'a> {
     version: &'static str,
     size: [u32; 2],
-    /// How many times as wide and high the picture is that counts and times are of.
+    /// Factor on both sides of the picture that counts and times refer to.
     supersample: u32,
     counts: Counts,
     device: &'a Device,
@@ -23,7 +23,7 @@ pub(super) struct Report<'a> {
     camera: Camera,
     outputs: Vec<Written>,
     timings_ms: PrintedTimings,
-    /// Of a graphics device.
+    /// Times of the passes of a graphics device.
     passes: Vec<PassTime>,
 }
 
@@ -42,7 +42,7 @@ struct Written {
 }
 
 impl<'a> Report<'a> {
-    /// Gathers what is known when everything is written.
+    /// Collects the facts after everything is written.
     pub(super) fn new(
         job: &Job,
         device: &'a Device,
@@ -70,13 +70,13 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// One line of JSON.
+    /// The report as one line of JSON.
     pub(super) fn to_json(&self) -> Result<String, Failure> {
-        // A path that is not UTF-8 is all that can fail here.
+        // Only a path that is not UTF-8 can fail here.
         serde_json::to_string(self).map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))
     }
 
-    /// One line on standard error.
+    /// Prints the summary on standard error.
     pub(super) fn summarize(&self) {
         let names: Vec<_> = self.outputs.iter().map(|written| written.path.display().to_string()).collect();
         let PrintedTimings { read, stages, write } = &self.timings_ms;

@@ -1,15 +1,15 @@
-//! Which frame each picture of a film shows.
+//! Schedule of a film: the frame that each picture shows.
 
 use crate::exit::Failure;
 
-/// Pictures a second of a film of what has no rate of its own.
+/// Pictures per second of a film whose frames have no rate of their own.
 pub(super) const USUAL_RATE: f64 = 30.0;
-/// Nanoseconds by which times may differ that are meant to be the same: they are rounded.
+/// Largest difference of equal times, in nanoseconds; stamps are rounded.
 const ROUNDING: i64 = 1000;
-/// Pictures of a film beyond which its times are rather broken than long: nine hours at the usual rate.
+/// Most pictures of a film. Longer films have broken time stamps.
 const MOST_PICTURES: f64 = 1e6;
 
-/// Frames a second of what moves evenly; the usual rate of what does not.
+/// Frames per second of evenly spaced frames; otherwise the default rate.
 pub(super) fn rate(times: &[i64]) -> f64 {
     match step(times) {
         Some(step) if is_even(times, step) => 1e9 / step,
@@ -17,7 +17,7 @@ pub(super) fn rate(times: &[i64]) -> f64 {
     }
 }
 
-/// Mean time from a frame to the next in nanoseconds, if there are several at different times.
+/// Mean time between frames in nanoseconds; `None` if all are at one time.
 fn step(times: &[i64]) -> Option<f64> {
     let (first, last) = (times.first()?, times.last()?);
     (last > first).then(|| last.abs_diff(*first) as f64 / (times.len() - 1) as f64)
@@ -28,16 +28,18 @@ fn is_even(times: &[i64], step: f64) -> bool {
     times.iter().enumerate().all(|(index, time)| time.abs_diff(expected(index)) <= ROUNDING.unsigned_abs())
 }
 
-/// The frames that a film of `rate` pictures a second shows, and how many pictures in a row each: at each moment the newest
-/// frame by then, so that all plays at its own speed. `times` are those of the frames, in nanoseconds, never falling; the last
-/// one is shown for as long as the others are in the mean.
+/// Frames that a film of `rate` pictures per second shows, each with its number of successive pictures. Each picture
+/// shows the newest frame of its time, so everything plays at its own speed.
+///
+/// `times` are those of the frames in nanoseconds, never decreasing. The last frame is shown for the mean duration of
+/// the others.
 pub(super) fn resample(times: &[i64], rate: f64, name: &str) -> Result<Vec<(usize, usize)>, Failure> {
     let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return Ok(Vec::new()) };
     let end = last.abs_diff(first) as f64 + step(times).unwrap_or(1e9 / rate);
     if end * rate * 1e-9 > MOST_PICTURES {
         let seconds = end * 1e-9;
-        let why = format!("a film of {seconds:.0} s is more than {MOST_PICTURES} pictures at {rate:.0} a second");
-        return Err(Failure::usage(format!("{name}: {why}; its stamps may have jumped: choose some --frames")));
+        let why = format!("a film of {seconds:.0} s has more than {MOST_PICTURES} pictures at {rate:.0} per second");
+        return Err(Failure::usage(format!("{name}: {why}; if its time stamps jump, choose a part with --frames")));
     }
     let mut shown: Vec<(usize, usize)> = Vec::new();
     for picture in 0_u32.. {
@@ -81,7 +83,8 @@ mod tests {
         let times = at(&[0, 100, 150, 1005, 1010, 1200]);
         assert_eq!(rate(&times), USUAL_RATE, "no rate is theirs");
         let shown = resample(&times, 10.0, "").expect("a film");
-        // Pictures at 0, 100, 200 ms and so on, to 1200 ms and 240 ms beyond; at none of them that of 1005 ms is the newest.
+        // Pictures are at 0, 100, 200 ms and so on, to 1200 ms and 240 ms beyond. The frame at 1005 ms is never the
+        // newest.
         assert_eq!(shown, [(0, 1), (1, 1), (2, 9), (4, 1), (5, 3)]);
         let often = resample(&times, 200.0, "").expect("a film");
         assert_eq!(often.iter().map(|(_, pictures)| pictures).sum::<usize>(), 288, "1.44 s");

@@ -63,7 +63,7 @@ fn what_is_there_is_not_made_again() {
     assert_eq!(folder.read("f_1.png"), b"kept", "this one was there");
     folder.fail(&["render", "sweep", "--resume", "-o", "f.mp4"], 2, &["--resume", "f_%05d.png"]);
     let averaged = ["render", "sweep", "--resume", "--frames-averaged", "4", "-o", "f_%d.png"];
-    folder.fail(&averaged, 2, &["--resume", "depends on those before"]);
+    folder.fail(&averaged, 2, &["--resume", "depends on earlier ones"]);
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn frames_that_show_nothing_are_told() {
     let out = folder.succeed(&["render", "sweep", "--eye", "15,15,2", "--look-at", "15,15.1,12", "-o", "f_%d.png"]);
     assert_eq!(pictures(&folder).len(), 4, "they have a picture as well");
     assert!(
-        out.stderr.contains("note: 2 frames show nothing, the first of them 0"),
+        out.stderr.contains("note: 2 frames show nothing, the first is frame 0"),
         "behind the eye and too near: {}",
         out.stderr
     );
@@ -227,7 +227,7 @@ fn recordings_made_at_once_are_shown_at_once() {
     let (aligned, said) = seconds(&["other.mcap"]);
     assert_eq!(aligned, [0.0, 0.1, 0.2, 0.4, 0.5], "by their stamps");
     assert!(
-        said.contains("other.mcap: begins 0.200 s after the first recorded at the same time"),
+        said.contains("other.mcap: begins 0.200 s after the first input, by its time stamps"),
         "which is said: {said}"
     );
     let (begun_at_once, said) = seconds(&["later.mcap"]);

@@ -83,12 +83,12 @@ fn nothing_that_is_no_number_gets_into_json() {
     assert_eq!(attribute(&report, "value")["not_finite"], 3, "of each attribute too");
     assert_eq!(attribute(&report, "value")["max"], 2.0, "the rest counts");
     let text = folder.succeed(&["info", "odd.ply"]).stdout;
-    assert!(text.contains("2 (33.3 %) without a place"), "{text}");
+    assert!(text.contains("2 (33.3 %) without a finite position"), "{text}");
 
     folder.write("none.ply", &points_ply(&["nan nan nan"; 3]));
     let report = json(&folder.succeed(&["info", "none.ply", "--json"]).stdout);
     assert_eq!([&report["bounds"], &report["spacing"]], [&Value::Null; 2], "no point has a place");
-    assert_eq!(report["warnings"][0], "no point has a place", "it says so");
+    assert_eq!(report["warnings"][0], "no point has a finite position", "it says so");
 }
 
 #[test]
