@@ -196,7 +196,7 @@ impl Findings {
                 );
                 line(true, "memory", what);
             }
-            _ => line(false, "memory", "unknown on this system; too large a cloud ends the program without a message".into()),
+            _ => line(false, "memory", "unknown here; too large a cloud ends the run without a message".into()),
         }
         let SelfTest { generate_ms, render_ms, gpu_ms, write_ms, read_ms, temporary_folder, errors } = &self.self_test;
         let took = [

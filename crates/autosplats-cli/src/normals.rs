@@ -93,7 +93,7 @@ fn orientation(
             |orientation| (orientation, "to the sensor"),
         )),
         OrientChoice::Sensor => known().map(|orientation| (orientation, "to the sensor")).ok_or_else(|| {
-            Failure::usage("--orient sensor: the file does not state the sensor's position; give it with --sensor X,Y,Z")
+            Failure::usage("--orient sensor: the file states no sensor position; give it with --sensor X,Y,Z")
         }),
         OrientChoice::Up => Ok(UP),
         OrientChoice::Outward => Ok((Orientation::Outward, "outward")),

@@ -33,7 +33,7 @@ pub(crate) fn manual(args: &ManArgs) -> Result<(), Failure> {
         if path.exists() && !args.force {
             return Err(Failure::new(
                 Exit::Output,
-                format!("{}: already exists; --force replaces it", path.display()),
+                format!("{}: already exists; --force replaces pages", path.display()),
             ));
         }
         check_target(path, &ReadFiles::default())?;

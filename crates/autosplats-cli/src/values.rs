@@ -200,9 +200,7 @@ pub(crate) fn range(text: &str) -> Result<[f32; 2], String> {
 
 /// Parses a vertical field of view in degrees.
 pub(crate) fn fov(text: &str) -> Result<f64, String> {
-    number(text)
-        .filter(|fov| (0.01..=170.0).contains(fov))
-        .ok_or("must be within 0.01 to 170 degrees".into())
+    number(text).filter(|fov| (0.01..=170.0).contains(fov)).ok_or("must be within 0.01 to 170 degrees".into())
 }
 
 /// Parses the height of an orthographic picture in world units, or `fit`.
@@ -210,7 +208,8 @@ pub(crate) fn ortho(text: &str) -> Result<Ortho, String> {
     if text == "fit" {
         return Ok(Ortho(None));
     }
-    let height = number(text).filter(|height| *height > 0.0).ok_or("must be a height above 0 in world units, or 'fit'")?;
+    let height =
+        number(text).filter(|height| *height > 0.0).ok_or("must be a height above 0 in world units, or 'fit'")?;
     Ok(Ortho(Some(height)))
 }
 

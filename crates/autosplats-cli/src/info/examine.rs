@@ -222,7 +222,7 @@ impl Report {
         self.tidy();
         self.compare(header_bounds);
         if count == 0 {
-            self.warn(if cloud.is_empty() { "there are no points in it" } else { "no point has a finite position" }.into());
+            self.warn(if cloud.is_empty() { "there are no points in it" } else { "no position is finite" }.into());
             return;
         }
         if check_memory("", cloud.len() as u64 * spacing::BYTES_PER_POINT).is_err() {
@@ -231,7 +231,7 @@ impl Report {
         }
         self.duplicates = Some(spacing::duplicates(cloud));
         if cloud.crs().unit == Some(Unit::Degree) {
-            self.warn("x and y are in degrees, z is not: spacing and density are unknown; project the points to metres".into());
+            self.warn("x and y are in degrees, z is not: no spacing or density; project the points to metres".into());
         } else {
             (self.spacing, self.density) = spacing::measure(cloud);
         }

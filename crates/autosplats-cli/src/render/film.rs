@@ -49,7 +49,7 @@ impl FilmJob {
         }
         let [output] = outputs else {
             return Err(Failure::usage(
-                "--out: frames need one film, or one name with a number such as f_%05d.png",
+                "--out: frames need one film, or one file name with a number such as f_%05d.png",
             ));
         };
         let all = FrameRange { first: 0, last: None };
@@ -61,8 +61,7 @@ impl FilmJob {
                 return Err(Failure::usage("--resume: a film cannot be resumed; write pictures as f_%05d.png"));
             }
             if !has_ffmpeg() {
-                let error =
-                    "films need ffmpeg, which is not installed; install it, or write pictures as f_%05d.png";
+                let error = "films need ffmpeg, which is not installed; install it, or write pictures as f_%05d.png";
                 return Err(Failure::usage(format!("{}: {error}", output.display())));
             }
         }

@@ -74,7 +74,7 @@ impl Job {
         let supersample = supersample.unwrap_or(if is_still { still_supersample(size) } else { 1 });
         if needs_layers && supersample > 1 {
             return Err(Failure::usage(
-                "--supersample: .exr layers cannot be averaged; write them in a separate run",
+                "--supersample: .exr layers cannot be averaged; render them by a separate command",
             ));
         }
         if resume && surface.frames_averaged > 1 {

@@ -105,7 +105,7 @@ pub(super) fn run(
             return Err(Failure::interrupted());
         }
         let why = waiting.or(last_refusal).map_or_else(String::new, |why| format!(": {why}"));
-        return Err(Failure::new(Exit::Input, format!("{}: no points came{why}", job.inputs.names())));
+        return Err(Failure::new(Exit::Input, format!("{}: no points arrived{why}", job.inputs.names())));
     }
     if !job.quiet {
         let of = |count: u64, what: &str| if count > 0 { format!(", {count} {what}") } else { String::new() };

@@ -95,7 +95,7 @@ impl Writer {
             let _ = self.queue.send(None);
         }
         drop(self.queue);
-        self.thread.join().unwrap_or_else(|_| Err(Failure::new(Exit::Output, "writing the pictures failed, which is a bug in this program")))
+        self.thread.join().unwrap_or_else(|_| Err(Failure::new(Exit::Output, "writing the pictures failed")))
     }
 }
 

@@ -88,7 +88,7 @@ fn nothing_that_is_no_number_gets_into_json() {
     folder.write("none.ply", &points_ply(&["nan nan nan"; 3]));
     let report = json(&folder.succeed(&["info", "none.ply", "--json"]).stdout);
     assert_eq!([&report["bounds"], &report["spacing"]], [&Value::Null; 2], "no point has a place");
-    assert_eq!(report["warnings"][0], "no point has a finite position", "it says so");
+    assert_eq!(report["warnings"][0], "no position is finite", "it says so");
 }
 
 #[test]

@@ -192,7 +192,7 @@ fn a_folder_that_is_watched_has_a_picture_of_each_new_file() {
 #[test]
 fn streams_that_show_nothing_say_so() {
     let folder = Folder::new();
-    folder.fail(&["render", "-", "-o", "f_%d.png"], 3, &["no points came"]);
+    folder.fail(&["render", "-", "-o", "f_%d.png"], 3, &["no points arrived"]);
     let mut child = start(&folder, &["-", "-o", "f_%d.png"]);
     input(&mut child).write_all(b"1 2 3\n4 5 6\n7 8 9\n").expect("it reads");
     let (code, _, stderr) = end(child);
