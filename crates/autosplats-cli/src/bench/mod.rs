@@ -1,4 +1,4 @@
-//! `autosplats bench`: how long each stage and pass of a frame takes, on each backend asked for.
+//! `autosplats bench`: times each stage and pass of a frame, on each requested backend.
 
 pub(crate) mod args;
 mod paper;
@@ -20,13 +20,13 @@ use crate::render::{render_failure, scene_camera};
 use crate::threads::start_threads;
 use crate::values::Neighbors;
 
-/// Frames before those that count: buffers are made, caches filled, clocks sped up.
+/// Frames before the measured ones, in which buffers are created, caches filled and clocks raised.
 const WARM_UP: usize = 3;
 
-/// Passes that build the kd-tree, which are no part of searching it.
+/// Prefix of the passes that build the kd-tree, as opposed to searching it.
 const BUILD: &str = "search/kd_tree/build/";
 
-/// Everything that `--json` prints.
+/// The object that `--json` prints.
 #[derive(Debug, Serialize)]
 struct Bench<'a> {
     version: &'static str,
@@ -36,33 +36,34 @@ struct Bench<'a> {
     points_per_pixel: u32,
     /// Whether silhouettes were trimmed.
     trim: bool,
-    /// Standard deviation of what the points were shaken by.
+    /// Standard deviation of the added noise, in the scene's units.
     #[serde(skip_serializing_if = "Option::is_none")]
     noise: Option<f64>,
     engine: String,
-    /// Frames measured; times are medians of them.
+    /// Number of measured frames; times are medians over them.
     frames: usize,
     /// Whether the points were new in each frame.
     stream: bool,
     runs: Vec<Run>,
 }
 
-/// One backend's frames.
+/// Measurements of one backend.
 #[derive(Debug, Serialize)]
 struct Run {
     device: Device,
     counts: Counts,
-    /// Of the first frame, which makes and fills the buffers; those of the others are in the timings.
+    /// Upload time of the first frame, which creates and fills the buffers, in milliseconds. Later uploads are in the
+    /// timings.
     first_upload_ms: f64,
-    /// From asking for a picture to having it.
+    /// Time from the request for a picture to the finished picture, in milliseconds.
     picture_ms: f64,
     timings_ms: Timings,
     passes: Vec<PassTime>,
-    /// Points whose neighbourhood was not yet found, before the first iteration and after each, of an engine that iterates.
+    /// Points without a complete neighbourhood, before the first iteration and after each; only of iterative engines.
     unconverged: Vec<u32>,
 }
 
-/// Renders the same frame again and again and prints the medians.
+/// Renders the same frame repeatedly and prints the medians.
 pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     let BenchArgs {
         evaluation,
@@ -92,7 +93,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     settings.check().map_err(render_failure)?;
     let name = scene.strip_prefix("scene:").unwrap_or(scene);
     let inputs = Inputs::scene(name)?;
-    // Devices are looked for before points are made: what cannot run says so at once.
+    // Missing devices fail before points are generated.
     let mut renderers = Vec::new();
     for &backend in backends {
         let renderer = Renderer::with_backend(backend.into()).map_err(render_failure)?;
@@ -101,7 +102,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     }
     let mut cloud = inputs.read(run.quiet)?;
     if let Some(sigma) = *noise {
-        let bar = Bar::new("shaking", run.quiet);
+        let bar = Bar::new("adding noise", run.quiet);
         cloud.add_noise(sigma, 0, &bar).map_err(edit_failure)?;
     }
     let mut bench = Bench {
@@ -143,7 +144,7 @@ fn measure(
     let bar = Bar::spinner(&format!("{} frames on {}", args.frames, device.name), args.run.quiet);
     let mut samples: Vec<(f64, Timings, Vec<PassTime>)> = Vec::new();
     let (mut counts, mut first_upload_ms) = (Counts::default(), 0.0);
-    // Whether points are new is told by their identity: two clouds that take turns always are.
+    // A renderer takes clouds of another identity as new points, so two alternating clouds are always new.
     let other = args.stream.then(|| copy(cloud)).transpose()?;
     for frame in 0..WARM_UP + args.frames {
         let cloud = other.as_ref().filter(|_| frame % 2 == 1).unwrap_or(cloud);
@@ -183,21 +184,21 @@ fn measure(
     })
 }
 
-/// Another cloud with the same points.
+/// A copy of the cloud with an identity of its own.
 fn copy(cloud: &PointCloud) -> Result<PointCloud, Failure> {
     let copy = PointCloud::new(cloud.origin(), cloud.positions().to_vec());
     let Some(colors) = cloud.colors() else { return Ok(copy) };
     copy.with_colors(colors.to_vec()).map_err(|error| Failure::new(Exit::Input, error))
 }
 
-/// The middle one of the values, of which there is at least one.
+/// The median of at least one value.
 fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_unstable_by(f64::total_cmp);
     values[values.len() / 2]
 }
 
-/// Passes in the order of their first time, how often each runs, and its milliseconds, all times together.
+/// Passes in the order of their first run, each with its number of runs and their total milliseconds.
 fn summed(passes: &[PassTime]) -> Vec<(&'static str, usize, f64)> {
     let mut sums: Vec<(&'static str, usize, f64)> = Vec::new();
     for &PassTime { pass, ms } in passes {
@@ -212,10 +213,10 @@ fn summed(passes: &[PassTime]) -> Vec<(&'static str, usize, f64)> {
 impl Bench<'_> {
     fn table(&self, cloud: &PointCloud) -> String {
         let Self { scene, size: [width, height], k, points_per_pixel, trim, noise, engine, frames, runs, .. } = self;
-        let whole = if *trim { "" } else { ", whole splats" };
+        let whole = if *trim { "" } else { ", untrimmed" };
         let noise = noise.map(|noise| format!("noise {noise}, ")).unwrap_or_default();
         let mut lines = vec![format!(
-            "{scene}: {} points, {noise}{width}x{height}, k {k}, {points_per_pixel} a pixel{whole}, {engine}; milliseconds, medians \
+            "{scene}: {} points, {noise}{width}x{height}, k {k}, {points_per_pixel} per pixel{whole}, {engine}; milliseconds, medians \
              of {frames} frames",
             cloud.len()
         )];
@@ -223,7 +224,7 @@ impl Bench<'_> {
             lines.push(String::new());
             lines.push(device.describe());
             let Counts { visible, active, recovered, .. } = counts;
-            lines.push(format!("  {visible} points visible, {active} reconstructed at first, {recovered} after that"));
+            lines.push(format!("  {visible} points visible, {active} reconstructed at first, {recovered} recovered"));
             if let [queries, left @ ..] = &unconverged[..] {
                 let percent = |left: &u32| format!("{:.2}", 100.0 - 100.0 * f64::from(*left) / f64::from(*queries));
                 let percents: Vec<_> = left.iter().map(percent).collect();
@@ -241,8 +242,8 @@ impl Bench<'_> {
                 }
                 let build: f64 = passes.iter().filter(|time| time.pass.starts_with(BUILD)).map(|time| time.ms).sum();
                 if stage == "search" && build > 0.0 {
-                    line("  building the tree", build);
-                    line("  searching it", search - build);
+                    line("  build the tree", build);
+                    line("  search the tree", search - build);
                 }
             }
             line("frame", *frame);

@@ -1,18 +1,18 @@
-//! Charts as SVG: stacked bars and lines, black on white, that a page can show at any size.
+//! SVG charts: stacked bars and lines, black on white, for a page at any zoom.
 
 use std::fmt::Write as _;
 
-/// Colours that those who confuse red and green tell apart (Okabe and Ito's), black left out.
+/// Colours that colour-blind readers can distinguish (Okabe and Ito), without black.
 const COLORS: [&str; 7] = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442"];
 
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 300.0;
-/// Space around the plot: left, top, right, bottom.
+/// Space around the plot in pixels: left, top, right, bottom.
 const MARGIN: [f64; 4] = [64.0, 34.0, 14.0, 44.0];
-/// Width of a column of the legend.
+/// Width of a column of the legend in pixels.
 const LEGEND_PX: f64 = 112.0;
 
-/// What is written along the axes.
+/// Title and axis labels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Labels<'a> {
     pub(super) title: &'a str,
@@ -20,14 +20,14 @@ pub(super) struct Labels<'a> {
     pub(super) y: &'a str,
 }
 
-/// Values of one series by place along x.
+/// A series of values [x, y].
 #[derive(Clone, Debug)]
 pub(super) struct Line {
     pub(super) name: String,
     pub(super) points: Vec<[f64; 2]>,
 }
 
-/// Bars, one for each name, of parts that lie on top of each other; `parts` names them.
+/// A chart of stacked bars, one per name; `parts` names their segments.
 pub(super) fn stacked_bars(labels: Labels<'_>, parts: &[&str], bars: &[(String, Vec<f64>)]) -> String {
     let tallest = bars.iter().map(|(_, values)| values.iter().sum::<f64>()).fold(0.0, f64::max);
     let step = nice_step(tallest);
@@ -60,7 +60,7 @@ pub(super) fn stacked_bars(labels: Labels<'_>, parts: &[&str], bars: &[(String, 
     svg + "</svg>\n"
 }
 
-/// Lines over a logarithmic y; values of nothing are left out.
+/// A chart of lines with a logarithmic y axis; values of 0 are left out.
 pub(super) fn log_lines(labels: Labels<'_>, lines: &[Line]) -> String {
     let values = || lines.iter().flat_map(|line| &line.points).filter(|[_, y]| *y > 0.0);
     let [low, high] = [f64::min, f64::max].map(|of| values().map(|[_, y]| y.log10()).reduce(of).unwrap_or(0.0));
@@ -103,7 +103,7 @@ fn plot_height() -> f64 {
     HEIGHT - MARGIN[1] - MARGIN[3]
 }
 
-/// Everything but the data, and the end.
+/// Start of the SVG with everything except the data.
 fn frame(labels: Labels<'_>, names: &[&str]) -> String {
     let legend = names.len().div_ceil(legend_columns()) as f64 * 16.0 + 8.0;
     let height = HEIGHT + legend;
@@ -153,14 +153,14 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// A step of 1, 2 or 5 times a power of ten that divides a range into five or so.
+/// A step of 1, 2 or 5 times a power of ten that divides a range into about five parts.
 fn nice_step(range: f64) -> f64 {
     let rough = (range / 5.0).max(f64::MIN_POSITIVE);
     let unit = 10f64.powf(rough.log10().floor());
     [1.0, 2.0, 5.0, 10.0].map(|step| step * unit).into_iter().find(|step| *step >= rough).unwrap_or(10.0 * unit)
 }
 
-/// As few digits as a tick needs.
+/// A tick's value in as few digits as needed.
 fn number(value: f64) -> String {
     let digits = if value == 0.0 { 0.0 } else { -value.abs().log10().floor() };
     let text = format!("{value:.*}", digits.clamp(0.0, 6.0) as usize + usize::from(value < 1.0 && value > 0.0));

@@ -1,4 +1,4 @@
-//! The paper's pictures: rendered, joined side by side, and what can be counted about them.
+//! The paper's figures: rendered, joined side by side, and measured.
 
 use std::path::Path;
 
@@ -13,33 +13,33 @@ use crate::exit::Failure;
 use crate::output::{write_file, write_png};
 use crate::render::render_failure;
 
-/// Pixels between pictures side by side.
+/// Gap between pictures side by side, in pixels.
 const GAP: u32 = 8;
-/// Splat scale at which single splats are seen.
+/// Splat scale at which single splats are distinguishable.
 const APART: f32 = 0.35;
 
-/// How far normals found on the fly are from those found beforehand, degrees.
+/// Angles between normals computed on the fly and precomputed ones, in degrees.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct NormalError {
     pub(super) points: usize,
     pub(super) mean: f64,
     pub(super) median: f64,
     pub(super) rmse: f64,
-    /// Parts of the points.
+    /// Fraction of the points below this angle.
     pub(super) within_5: f64,
     pub(super) within_10: f64,
-    /// Of one picture with the other as the truth, decibels; `None` if they are equal.
+    /// PSNR of the pictures in decibels, with the precomputed one as the truth; `None` if they are equal.
     pub(super) psnr: Option<f64>,
 }
 
-/// Medians of the k-radii of two bodies, in the scene's unit, each seen large enough.
+/// Medians of the k-radii of the two bodies, in the scene's unit, each from a picture that shows the body large enough.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Radii {
     pub(super) large: f64,
     pub(super) small: f64,
 }
 
-/// The scene as it is measured, at half the size.
+/// Renders the scene as measured, at half the size.
 pub(super) fn picture(loaded: &Loaded<'_>, path: &Path) -> Result<(), Failure> {
     let Loaded { scene, cloud, camera } = loaded;
     let size = scene.size.map(|side| side / 2);
@@ -83,15 +83,15 @@ pub(super) fn normals(loaded: &Loaded<'_>, side: u32, path: &Path) -> Result<Nor
     })
 }
 
-/// Figure 7: a small body on the head of a large one; the surface, the k-radius in colours, and single splats, the last
-/// also near the small one.
+/// Figure 7: a small body on the head of a large one. Shows the surface, the k-radius in colours and single splats, the
+/// latter also near the small body.
 pub(super) fn scales(count: usize, side: u32, quiet: bool, path: &Path) -> Result<Radii, Failure> {
     let (cloud, camera) = generated(&format!("two-scales:{count}"), quiet)?;
     let up = camera.up.normalize();
     let height = |position: &[f32; 3]| (Vec3::from(*position).as_dvec3() + cloud.origin()).dot(up);
     let mut heights: Vec<f64> = cloud.positions().iter().map(height).collect();
     heights.sort_unstable_by(f64::total_cmp);
-    // As many points are on the small one as on the large one, and it stands on top.
+    // Both bodies have equally many points, and the small one stands on top.
     let border = heights.get(heights.len() / 2).copied().unwrap_or_default();
     let is_small = |position: &[f32; 3]| height(position) > border;
     let small: Vec<DVec3> =
@@ -124,7 +124,7 @@ pub(super) fn scales(count: usize, side: u32, quiet: bool, path: &Path) -> Resul
     Ok(Radii { large: medians[0], small: medians[1] })
 }
 
-/// Figure 9: a scan and, nearer, the curvature of its points.
+/// Figure 9: a scan, a closer view, and the curvature there.
 pub(super) fn curvature(loaded: &Loaded<'_>, side: u32, path: &Path) -> Result<(), Failure> {
     let Loaded { cloud, camera, .. } = loaded;
     let near = closer(cloud, camera);
@@ -139,7 +139,7 @@ pub(super) fn curvature(loaded: &Loaded<'_>, side: u32, path: &Path) -> Result<(
     write_side_by_side(&images.iter().collect::<Vec<_>>(), path)
 }
 
-/// The same camera on the upper part of the cloud, three times as near.
+/// The same camera aimed at the upper part of the cloud, magnified three times.
 fn closer(cloud: &PointCloud, camera: &Camera) -> Camera {
     let up = camera.up.normalize();
     let height = |position: &[f32; 3]| (Vec3::from(*position).as_dvec3() + cloud.origin()).dot(up);
@@ -149,7 +149,7 @@ fn closer(cloud: &PointCloud, camera: &Camera) -> Camera {
     zoomed(camera, camera.look_at + up * (aim - camera.look_at.dot(up)), 3.0)
 }
 
-/// A camera that sees `look_at` in the middle, `times` as large.
+/// A camera with `look_at` in the middle, magnified `times`.
 fn zoomed(camera: &Camera, look_at: DVec3, times: f64) -> Camera {
     let projection = match camera.projection {
         Projection::PerspectiveFovDeg(fov) => Projection::PerspectiveFovDeg(fov / times),
@@ -158,7 +158,7 @@ fn zoomed(camera: &Camera, look_at: DVec3, times: f64) -> Camera {
     Camera { look_at, projection, ..*camera }
 }
 
-/// Writes pictures of one height beside each other, white between them.
+/// Writes pictures of equal height side by side, with white gaps.
 fn write_side_by_side(images: &[&Image], path: &Path) -> Result<(), Failure> {
     let height = images.iter().map(|image| image.height).max().unwrap_or(1);
     let width = images.iter().map(|image| image.width + GAP).sum::<u32>() - GAP;

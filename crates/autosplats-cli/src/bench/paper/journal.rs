@@ -1,4 +1,4 @@
-//! What was measured so far, kept in a file so that a run that was stopped goes on where it was.
+//! Journal of measurements: a file that lets an interrupted run be resumed.
 
 use std::collections::BTreeMap;
 use std::fs::read_to_string;
@@ -12,7 +12,7 @@ use serde_json::Value;
 use crate::exit::{Exit, Failure};
 use crate::output::write_file;
 
-/// Measurements by what was measured, in a JSON file.
+/// Measurements by key, in a JSON file.
 #[derive(Debug)]
 pub(super) struct Journal {
     path: PathBuf,
@@ -20,12 +20,12 @@ pub(super) struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal at `path`, or starts one; a `fresh` one forgets what is there.
+    /// Opens the journal at `path`, or creates one. `fresh` discards existing entries.
     pub(super) fn open(path: &Path, fresh: bool) -> Result<Self, Failure> {
         let bad = |why: String| {
             Failure::new(
                 Exit::Input,
-                format!("{}: not a journal of measurements: {why}; --fresh starts a new one", path.display()),
+                format!("{}: not a journal of measurements: {why}; --fresh starts again", path.display()),
             )
         };
         let entries = match read_to_string(path) {
@@ -37,12 +37,12 @@ impl Journal {
         Ok(Self { path: path.into(), entries })
     }
 
-    /// What is noted of `key`, if it can be understood.
+    /// The entry of `key`, if it has the type `T`.
     pub(super) fn get<T: DeserializeOwned>(&self, key: &str) -> Option<T> {
         self.entries.get(key).and_then(|value| serde_json::from_value(value.clone()).ok())
     }
 
-    /// Notes a measurement at once.
+    /// Stores a measurement and writes the file.
     pub(super) fn note(&mut self, key: &str, measured: &impl Serialize) -> Result<(), Failure> {
         let fail = |error: serde_json::Error| Failure::new(Exit::Output, format!("{key}: {error}"));
         self.entries.insert(key.into(), serde_json::to_value(measured).map_err(fail)?);

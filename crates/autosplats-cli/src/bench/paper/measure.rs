@@ -1,4 +1,4 @@
-//! What is measured of each scene, and the measuring.
+//! Measurements of a scene.
 
 use autosplats::{
     Backend, Camera, Counts, Error, Image, NormalSettings, PassTime, RadiusTrial, Reconstruction, Renderer,
@@ -15,32 +15,32 @@ use crate::render::render_failure;
 
 /// The k of Table 1.
 pub(super) const K: u32 = 10;
-/// Part of the points whose k-radius is to be exact, the paper's.
+/// Fraction of the points whose k-radius must be exact, as in the paper.
 const ACCURACY: f64 = 0.999;
-/// A frame that takes longer is measured once, the first time.
+/// Time in milliseconds above which a frame is measured only once, at its first run.
 const SLOW_MS: f64 = 3000.0;
-/// Radii of neighbourhoods that differ by a greater part are not the same.
+/// Largest relative difference of equal k-radii.
 const SAME: f32 = 1e-4;
-/// Brightness, of 255, by which pixels may differ and still look the same.
+/// Largest difference of equal pixels, in levels of 255.
 const SEEN: u8 = 2;
 
-/// A way to find neighbours, and where.
+/// A search engine on a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Method {
     GridCpu,
     GridGpu,
-    /// The paper's own.
+    /// The paper's engine.
     Communication,
-    /// Its rival.
+    /// The paper's baseline.
     KdTree,
 }
 
 impl Method {
     pub(super) const ALL: [Self; 4] = [Self::GridCpu, Self::GridGpu, Self::Communication, Self::KdTree];
-    /// Those that Figure 10 shows: the paper has it for its own search, of which a frame of any k is taken as it comes.
+    /// Methods in Figure 10. The paper shows its own search, which takes any k without preparation.
     pub(super) const BY_STAGE: [Self; 3] = [Self::GridCpu, Self::GridGpu, Self::Communication];
 
-    /// How tables call it.
+    /// Name in tables.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::GridCpu => "screen grid, CPU",
@@ -50,7 +50,7 @@ impl Method {
         }
     }
 
-    /// The engine; a kd-tree has a first radius.
+    /// The engine. Only the kd-tree uses `first_radius`.
     fn engine(self, first_radius: f32) -> SearchEngine {
         match self {
             Self::GridCpu | Self::GridGpu => SearchEngine::ScreenGrid,
@@ -67,59 +67,59 @@ impl Method {
 /// A measurement, or why the device refused it.
 pub(super) type Outcome<T> = Result<T, String>;
 
-/// Medians of some frames; milliseconds.
+/// Medians of several frames, in milliseconds.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Timing {
     /// Points of the cloud.
     pub(super) points: usize,
     pub(super) visible: usize,
-    /// Points reconstructed, of those.
+    /// Reconstructed points among the visible ones.
     pub(super) reconstructed: usize,
     pub(super) frames: usize,
     pub(super) project: f64,
     pub(super) search: f64,
-    /// Of the search, making a tree.
+    /// Time to build a tree, part of the search.
     pub(super) build: f64,
     pub(super) fit: f64,
     pub(super) splat: f64,
     pub(super) shade: f64,
     pub(super) frame: f64,
-    /// Points searched for in the last frame, and after each iteration those without a radius yet; empty where nothing
-    /// iterates.
+    /// Points of the last frame without a k-radius, before the first iteration and after each; empty without
+    /// iterations.
     pub(super) convergence: Vec<u32>,
 }
 
-/// The first radius of the kd-tree search that was best, as the paper chose it.
+/// The best first radius of the kd-tree search, chosen as in the paper.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct FirstRadius {
     pub(super) radius: f32,
-    /// Part of the visible points whose k-radius is exact with it.
+    /// Fraction of the visible points whose k-radius is exact with this radius.
     pub(super) accuracy: f64,
 }
 
-/// How well an engine's neighbourhoods agree with exact ones.
+/// Agreement of an engine's neighbourhoods with exact ones.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Accuracy {
-    /// Part of the visible points whose k-radius is the exact one among visible points.
+    /// Fraction of the visible points whose k-radius is exact among the visible points.
     pub(super) on_screen: f64,
-    /// Part whose k-radius is the exact one among all points.
+    /// Fraction whose k-radius is exact among all points.
     pub(super) in_space: f64,
-    /// Part whose neighbourhood a rule cut short, a gap or the bound on work, or that has none.
+    /// Fraction whose neighbourhood is empty, or ended at a gap or at the limit of work.
     pub(super) cut_short: f64,
-    /// Points searched for.
+    /// Number of points that were searched for.
     pub(super) searched: usize,
-    /// Iterations that took; 0 where nothing iterates.
+    /// Number of iterations; 0 without iterations.
     pub(super) iterations: usize,
 }
 
-/// Times of kiddo's kd-tree: built, and asked for the neighbours of each point.
+/// Times of kiddo's kd-tree: building it and finding the neighbours of each point.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct KiddoTimes {
     pub(super) visible_ms: f64,
     pub(super) all_ms: f64,
 }
 
-/// The renderers, and what they run on.
+/// The renderers and their devices.
 #[derive(Debug)]
 pub(super) struct Renderers {
     cpu: Renderer,
@@ -131,7 +131,7 @@ impl Renderers {
         Self { cpu: Renderer::new(), gpu: Renderer::with_backend(Backend::Gpu).map_err(|error| error.to_string()) }
     }
 
-    /// One line for each.
+    /// One line per device.
     pub(super) fn describe(&self) -> Vec<String> {
         let gpu = match &self.gpu {
             Ok(renderer) => Device::of(renderer).describe(),
@@ -140,7 +140,7 @@ impl Renderers {
         vec![Device::of(&self.cpu).describe(), gpu]
     }
 
-    /// What tells a method's measurements on this device from those on others.
+    /// Name of the method's device, part of the measurement's key.
     pub(super) fn device(&self, method: Method) -> String {
         match &self.gpu {
             Ok(renderer) if method.is_on_gpu() => Device::of(renderer).name,
@@ -149,7 +149,7 @@ impl Renderers {
         }
     }
 
-    /// Whether the GPU is a program on the processor.
+    /// Whether the GPU is a software renderer.
     pub(super) fn is_software(&self) -> bool {
         self.gpu.as_ref().is_ok_and(|gpu| gpu.adapter().is_some_and(|adapter| adapter.software))
     }
@@ -159,7 +159,7 @@ impl Renderers {
     }
 }
 
-/// A scene ready to be rendered.
+/// A scene ready for rendering.
 #[derive(Debug)]
 pub(super) struct Loaded<'a> {
     pub(super) scene: &'a PaperScene,
@@ -167,14 +167,14 @@ pub(super) struct Loaded<'a> {
     pub(super) camera: Camera,
 }
 
-/// The settings of a measurement: the paper's, but these.
+/// Settings of a measurement: those of the paper with these values.
 pub(super) fn settings(method: Method, first_radius: f32, k: u32, culled: bool) -> Settings {
     let engine = method.engine(first_radius);
     let reconstruction = Reconstruction { k, engine, grid_culling: culled, ..Reconstruction::paper() };
     Settings { reconstruction, ..Settings::default() }
 }
 
-/// Takes what a device refuses as an outcome, everything else as a failure.
+/// Turns a device's refusal into an outcome; other errors are failures.
 fn outcome<T>(result: Result<T, Error>) -> Result<Outcome<T>, Failure> {
     match result {
         Ok(value) => Ok(Ok(value)),
@@ -185,7 +185,7 @@ fn outcome<T>(result: Result<T, Error>) -> Result<Outcome<T>, Failure> {
     }
 }
 
-/// Renders frames of a scene and takes the medians of their times.
+/// Renders frames of a scene and returns the medians of their times.
 pub(super) fn time(
     renderers: &mut Renderers,
     loaded: &Loaded<'_>,
@@ -200,14 +200,14 @@ pub(super) fn time(
     };
     let mut samples: Vec<(Timings, f64)> = Vec::new();
     let mut counts = Counts::default();
-    // The first frame makes the buffers, and does not count unless it is one of few.
+    // The first frame creates the buffers and is not counted, unless it is slow.
     for frame in 0..=frames {
         let rendered = match outcome(renderer.render(cloud, camera, scene.size, settings))? {
             Ok(rendered) => rendered,
             Err(why) => return Ok(Err(why)),
         };
         if method.is_on_gpu() && rendered.passes.is_empty() {
-            return Ok(Err("this device does not time its passes".into()));
+            return Ok(Err("the device does not time passes".into()));
         }
         counts = rendered.counts;
         // An empty sum of floats is -0.
@@ -250,22 +250,22 @@ pub(super) fn first_radius(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Re
     Ok(best.map(|RadiusTrial { first_radius, accuracy, .. }| FirstRadius { radius: first_radius, accuracy }))
 }
 
-/// Whether a pass makes a search structure that other points could be looked up in.
+/// Whether a pass builds the search structure.
 fn is_build(time: &PassTime) -> bool {
     time.pass.starts_with(BUILD)
 }
 
-/// Distances to the exact k-th neighbours among some points of a cloud, by index in the cloud.
+/// Exact k-radii among the visible points and among all points of a cloud.
 #[derive(Debug)]
 pub(super) struct Exact {
     on_screen: Vec<f32>,
     in_space: Vec<f32>,
-    /// Index in the cloud of each of `on_screen`.
+    /// Indices in the cloud of the points of `on_screen`.
     visible: Vec<u32>,
 }
 
 impl Exact {
-    /// Finds them in a kd-tree of the visible points, and in one of all.
+    /// Computes the radii with a kd-tree of the visible points and one of all points.
     pub(super) fn new(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Result<Self, Failure> {
         let Loaded { scene, cloud, camera } = loaded;
         let settings = settings(Method::GridCpu, f32::NAN, K, false);
@@ -283,11 +283,11 @@ impl Exact {
 fn exact_radii(cloud: &PointCloud) -> Result<Vec<f32>, Failure> {
     let settings = NormalSettings { k: K, ..NormalSettings::default() };
     let normals = estimate_normals(cloud, &settings, &()).map_err(render_failure)?;
-    // The radius there is 2·√(r²/k).
+    // The density radius is 2·√(r²/k).
     Ok(normals.radius.into_iter().map(|radius| 0.5 * radius * (K as f32).sqrt()).collect())
 }
 
-/// Iterations after which nothing changed any more, of how many points were left before the first and after each.
+/// Number of iterations until the last change, from the counts of unfinished points before the first and after each.
 pub(super) fn iterations(left: &[u32]) -> usize {
     (1..left.len()).rev().find(|&at| left[at] < left[at - 1]).unwrap_or(0)
 }
@@ -319,7 +319,7 @@ pub(super) fn accuracy(
         on_screen += usize::from(seen.is_ok_and(|exact| same(surfel.k_radius, exact)));
         in_space += usize::from(same(surfel.k_radius, exact.in_space[surfel.point as usize]));
     }
-    // No two visible points are in one place.
+    // Visible points have distinct positions, so a k-radius of 0 means no neighbour.
     let alone = surfels.iter().filter(|surfel| surfel.k_radius == 0.0).count();
     let count = surfels.len().max(1) as f64;
     Ok(Ok(Accuracy {
@@ -331,7 +331,7 @@ pub(super) fn accuracy(
     }))
 }
 
-/// Times of kiddo, if the program was built with it.
+/// Measures kiddo, if the program was built with it.
 #[cfg(feature = "kiddo")]
 pub(super) fn kiddo(loaded: &Loaded<'_>, exact: &Exact) -> Outcome<KiddoTimes> {
     let positions = loaded.cloud.positions();
@@ -344,7 +344,7 @@ fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
     use kiddo::{ImmutableKdTree, SquaredEuclidean};
     let start = std::time::Instant::now();
     let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(points) else { return f64::NAN };
-    // The point itself is found too.
+    // kiddo also finds the point itself.
     let nearest = std::num::NonZero::new(K as usize + 1).unwrap_or(std::num::NonZero::<usize>::MIN);
     tree.query_batch(points).nearest_n::<SquaredEuclidean<f32>>(nearest).for_each(|_, found| {
         std::hint::black_box(found);
@@ -352,13 +352,13 @@ fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 
-/// Says how to have kiddo.
+/// Returns how to build with kiddo.
 #[cfg(not(feature = "kiddo"))]
 pub(super) fn kiddo(_: &Loaded<'_>, _: &Exact) -> Outcome<KiddoTimes> {
-    Err("this program was built without kiddo; build it with cargo build --release --features kiddo".into())
+    Err("this program was built without kiddo; build it with --features kiddo".into())
 }
 
-/// Part of the pixels that look different with grid culling.
+/// Fraction of the pixels that look different with grid culling.
 pub(super) fn culling_difference(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Result<f64, Failure> {
     let Loaded { scene, cloud, camera } = loaded;
     let mut images: Vec<Image> = Vec::new();

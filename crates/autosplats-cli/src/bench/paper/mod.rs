@@ -1,9 +1,8 @@
-//! `autosplats bench paper`: the paper's evaluation [Paper, §8], repeated on this machine and written up as a page.
+//! `autosplats bench paper`: repeats the paper's evaluation [Paper, §8] on this machine and writes a page about it.
 //!
 //! # How it works
-//! Everything to be measured is a [`Task`] with a key. What has been measured is kept in a journal under its key, so that a
-//! run that was stopped goes on where it was, and other scenes or devices can be added later. In the end the page is written
-//! from the journal alone.
+//! Each measurement is a [`Task`] with a key. A journal keeps results by key, so that an interrupted run can be
+//! resumed, and other scenes or devices can be added later. The page is written from the journal alone.
 
 mod chart;
 mod figures;
@@ -32,39 +31,39 @@ use crate::output::{ReadFiles, check_target, print_line, write_file};
 use crate::progress::Bar;
 use crate::threads::start_threads;
 
-/// The ks of Figure 10.
+/// Values of k in Figure 10.
 const KS: [u32; 10] = [5, 10, 15, 20, 25, 30, 35, 40, 45, 50];
-/// Those for splat communication on a device that is a program on the processor: a frame takes it up to 38 s there.
+/// Values of k for splat communication on a software renderer, where a frame takes very long.
 const FEW_KS: [u32; 4] = [5, 10, 25, 50];
-/// Those of a quick run.
+/// Values of k of a quick run.
 const QUICK_KS: [u32; 3] = [5, 10, 20];
-/// Frames that medians are taken of.
+/// Frames per median.
 const FRAMES: usize = 5;
-/// Points and side of the pictures of Figures 6, 7 and 9, and those of a quick run.
+/// Number of points and side in pixels of the pictures of Figures 6, 7 and 9: [full run, quick run].
 const TWO_SCALES: [usize; 2] = [72_000, 10_000];
 const SIDE: [u32; 2] = [600, 150];
 
-/// Pictures in the folder of results.
+/// File names of the figures in the folder of results.
 const FIGURE_6: &str = "figure-6.png";
 const FIGURE_7: &str = "figure-7.png";
 const FIGURE_9: &str = "figure-9.png";
 
-/// What is to be measured of a scene.
+/// A measurement of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Task {
-    /// What it looks like.
+    /// A picture of the scene.
     Picture,
-    /// A line of Table 1, with grid culling or without.
+    /// A line of Table 1; the flag turns on grid culling.
     Table(Method, bool),
-    /// kiddo's times beside it.
+    /// kiddo's times, a column of Table 1.
     Kiddo,
-    /// What the kd-tree is to be searched with.
+    /// The best first radius of the kd-tree.
     FirstRadius,
-    /// A bar of Figure 10.
+    /// A bar of Figure 10, for a k.
     Stages(Method, u32),
     /// A line of the table of accuracies.
     Accuracy(Method),
-    /// What grid culling changes in the picture.
+    /// Difference that grid culling makes in the picture.
     Culling,
     /// Figure 6.
     Normals,
@@ -73,7 +72,7 @@ enum Task {
 }
 
 impl Task {
-    /// What its measurement is kept under.
+    /// Key of the measurement in the journal.
     fn key(self, scene: &PaperScene, renderers: &Renderers) -> String {
         let scene = scene.key();
         match self {
@@ -96,7 +95,7 @@ impl Task {
         }
     }
 
-    /// What it is called while it runs.
+    /// Name of the measurement in progress messages.
     fn describe(self) -> String {
         match self {
             Self::Table(method, _) => format!("Table 1, {}", method.name()),
@@ -111,8 +110,8 @@ impl Task {
         }
     }
 
-    /// Whether it was measured, in a form that is still understood. What was refused may be granted the next time, by
-    /// another build or a device with more memory left.
+    /// Whether the journal has a usable result. A refused measurement is repeated, since another build or more free
+    /// memory may allow it.
     fn is_done(self, key: &str, scene: &PaperScene, journal: &Journal, pictures: &Path) -> bool {
         fn measured<T: serde::de::DeserializeOwned>(journal: &Journal, key: &str) -> bool {
             journal.get::<Outcome<T>>(key).is_some_and(|outcome| outcome.is_ok())
@@ -131,7 +130,7 @@ impl Task {
     }
 }
 
-/// What belongs to a scene, in the order of the page.
+/// Measurements of a scene, in the order of the page.
 fn tasks(scene: &PaperScene, ks: &[u32], few_ks: &[u32]) -> Vec<Task> {
     let methods = || Method::ALL.into_iter();
     let mut tasks = vec![Task::Picture, Task::FirstRadius];
@@ -151,18 +150,18 @@ fn tasks(scene: &PaperScene, ks: &[u32], few_ks: &[u32]) -> Vec<Task> {
     tasks
 }
 
-/// Measures what is not yet in the journal, and writes the page.
+/// Runs the measurements that the journal lacks, and writes the page.
 pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
     let PaperArgs { scenes, bunny, gallop, out, quick, fresh, run } = args;
     start_threads(run)?;
     let quick_index = usize::from(*quick);
     let scenes = scenes.iter().map(|name| scene(name, bunny.as_deref(), gallop.as_deref(), *quick));
     let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
-    // A quick run does not touch what a full one left.
+    // A quick run has files of its own, so that the results of a full run stay.
     let suffix = if *quick { "-quick" } else { "" };
     let pictures = out.join(format!("results{suffix}"));
     create_dir_all(&pictures).map_err(|error| {
-        Failure::new(Exit::Output, format!("{}: cannot make the folder: {error}", pictures.display()))
+        Failure::new(Exit::Output, format!("{}: cannot create the folder: {error}", pictures.display()))
     })?;
     let page = out.join(format!("RESULTS{suffix}.md"));
     check_target(&page, &ReadFiles::default())?;
@@ -264,7 +263,7 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
     print_line(&page.display().to_string())
 }
 
-/// The file with a scene's picture.
+/// File name of a scene's picture.
 fn picture_name(scene: &PaperScene) -> String {
     format!("scene-{}.png", scene.name)
 }
@@ -277,7 +276,7 @@ fn scene(name: &str, bunny: Option<&Path>, gallop: Option<&Path>, quick: bool) -
     let scene = PaperScene::new(known, bunny, gallop, quick);
     match scene.file() {
         Some(path) if !path.exists() => {
-            Err(Failure::new(Exit::Input, format!("{}: there is no such file or folder", path.display())))
+            Err(Failure::new(Exit::Input, format!("{}: no such file or folder", path.display())))
         }
         _ => Ok(scene),
     }

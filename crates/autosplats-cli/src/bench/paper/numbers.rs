@@ -1,12 +1,12 @@
-//! The numbers of the page that are worked out from others.
+//! Derived numbers of the page.
 
-/// The paper's speedup of one search over another, by point and overall: milliseconds of each, and points.
+/// Speedup of one search over another as in the paper, per point and overall, from the milliseconds and points of each.
 pub(super) fn speedups([slow_ms, fast_ms]: [f64; 2], [slow_points, fast_points]: [usize; 2]) -> [f64; 2] {
     let overall = slow_ms / fast_ms;
     [overall * fast_points as f64 / slow_points.max(1) as f64, overall]
 }
 
-/// A part as a percentage with as many digits as tell it from all and nothing.
+/// A fraction in percent, with enough digits to differ from 0 and 100 %.
 pub(super) fn percent(part: f64) -> String {
     let percent = 100.0 * part;
     let rest = percent.min(100.0 - percent);
@@ -24,7 +24,7 @@ mod tests {
 
     #[test]
     fn speedups_are_the_papers() {
-        // Table 1: thousands of points, and of pixels, and what it says of them.
+        // Table 1: milliseconds, thousands of points and pixels, and the speedups that the paper states.
         for (ms, points, [by_point, overall]) in [
             ([14.0, 9.0], [36, 34], [1.47, 1.56]),
             ([95.0, 37.0], [546, 291], [1.37, 2.57]),

@@ -1,4 +1,4 @@
-//! The page: tables, charts and what they say, from the journal alone.
+//! The page: tables, charts and text, from the journal alone.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -13,17 +13,17 @@ use super::{FIGURE_6, FIGURE_7, FIGURE_9, FRAMES, Task, picture_name, tasks};
 use crate::exit::Failure;
 use crate::output::write_file;
 
-/// The chart of Figure 11.
+/// File name of the chart of Figure 11.
 const CONVERGENCE: &str = "figure-11.svg";
 
-/// What a page is made from.
+/// Input of the page.
 #[derive(Debug)]
 pub(super) struct Report<'a> {
     pub(super) journal: &'a Journal,
     pub(super) renderers: &'a Renderers,
     pub(super) scenes: &'a [PaperScene],
     pub(super) ks: &'a [u32],
-    /// Key of Figure 7.
+    /// Key of Figure 7 in the journal.
     pub(super) scales: &'a str,
     /// Name of the folder with pictures and charts, beside the page.
     pub(super) folder: &'a str,
@@ -36,7 +36,7 @@ impl Report<'_> {
         self.journal.get(&task.key(scene, self.renderers))
     }
 
-    /// Milliseconds of search, and microseconds per point searched for.
+    /// A cell of Table 1: milliseconds of the search, and microseconds per point searched for.
     fn search(&self, scene: &PaperScene, method: Method, culled: bool) -> String {
         match self.timing(scene, Task::Table(method, culled)) {
             Some(Ok(timing)) => {
@@ -146,7 +146,7 @@ impl Report<'_> {
         }
     }
 
-    /// What separates these figures from the paper's.
+    /// Explains why the times differ from the paper's.
     fn why_times_differ(&self, page: &mut String) {
         *page += "\nWhy the times differ: the paper measured on a graphics card of 2012, which rasterises in hardware.";
         if self.renderers.is_software() {
@@ -160,7 +160,7 @@ impl Report<'_> {
                   does not know which are visible; the screen grid searches for visible points only.\n";
     }
 
-    /// The paper's speedups: the kd-tree's time over that of another search, by point and overall.
+    /// Speedups as in the paper: the kd-tree's time over that of another search, per point and overall.
     fn ratios(&self, page: &mut String) {
         *page += "\n### Ratios on one device\n\n\
                   The ratios compare search times. *Overall* divides time by time. *By point*, as in the paper, first \
@@ -385,7 +385,7 @@ impl Report<'_> {
              good quality\". The table gives the percentage of points that converged here after each iteration.\n\n| \
              scene |"
         );
-        // The paper's chart is of percentages left.
+        // The paper's chart shows the remaining points in percent.
         let longest = lines.iter().map(|line| line.points.len()).max().unwrap_or(1);
         for iteration in 1..longest {
             _ = write!(page, " {iteration} |");
@@ -403,7 +403,7 @@ impl Report<'_> {
         }
     }
 
-    /// For each scene the percentage of points left before each iteration, from the first on.
+    /// For each scene, the percentage of unfinished points before each iteration.
     fn convergence(&self) -> Vec<Line> {
         let line = |scene: &PaperScene| {
             let timing = self.timing(scene, Task::Table(Method::Communication, false))?.ok()?;
@@ -415,7 +415,7 @@ impl Report<'_> {
         self.scenes.iter().filter_map(line).collect()
     }
 
-    /// Why there are no figures where there are none.
+    /// Lists refused measurements and the reasons.
     fn refusals(&self, page: &mut String) {
         let mut lines = Vec::new();
         for scene in self.scenes {
@@ -433,7 +433,7 @@ impl Report<'_> {
         }
     }
 
-    /// Milliseconds of each stage, for each k that was measured.
+    /// Milliseconds per stage, for each measured k.
     fn bars(&self, scene: &PaperScene, method: Method) -> Vec<(String, Vec<f64>)> {
         let bar = |&k: &u32| {
             let Some(Ok(timing)) = self.timing(scene, Task::Stages(method, k)) else { return None };
@@ -443,7 +443,7 @@ impl Report<'_> {
         self.ks.iter().filter_map(bar).collect()
     }
 
-    /// Writes the charts that the page shows.
+    /// Writes the charts of the page.
     pub(super) fn write_charts(&self, folder: &Path) -> Result<(), Failure> {
         let labels = Labels { title: "splat communication", x: "iteration", y: "points without a k-radius, %" };
         let lines = self.convergence();

@@ -1,4 +1,4 @@
-//! The scenes of the paper's evaluation, or what stands in for them.
+//! The scenes of the paper's evaluation, or their substitutes.
 
 use std::path::{Path, PathBuf};
 
@@ -11,14 +11,14 @@ use crate::input::{Inputs, read_failure};
 use crate::progress::Bar;
 use crate::render::{render_failure, scene_camera};
 
-/// The paper's pictures.
+/// Size of the paper's pictures in pixels.
 const SIZE: [u32; 2] = [1760, 900];
-/// Sides of the pictures of a quick run.
+/// Size of the pictures of a quick run in pixels.
 const QUICK_SIZE: [u32; 2] = [440, 225];
-/// Vertical angle of view that files are fitted into, and that the herd is then seen with.
+/// Vertical field of view in degrees that files are fitted into. The herd is then shown with `HERD_FOV_DEG`.
 const FOV_DEG: f64 = 30.0;
 const HERD_FOV_DEG: f64 = 17.0;
-/// Horses in the herd, and in a row of it.
+/// Number of horses in the herd and in one of its rows.
 const HORSES: usize = 24;
 const ROW: usize = 8;
 
@@ -26,23 +26,24 @@ const ROW: usize = 8;
 #[derive(Clone, Debug)]
 pub(super) struct PaperScene {
     pub(super) name: &'static str,
-    /// What the paper says of it.
+    /// The paper's figures of this scene.
     pub(super) paper: PaperFigures,
-    /// Points asked for; a file has those that it has.
+    /// Number of points to generate; ignored for a file.
     points: usize,
-    /// Width and height of its pictures.
+    /// Width and height of the pictures in pixels.
     pub(super) size: [u32; 2],
     source: Source,
 }
 
-/// Table 1 of the paper: a GeForce GTX 580, k = 10. Milliseconds; `None` where it gives none.
+/// A scene's figures in Table 1 of the paper, in milliseconds: GeForce GTX 580, k = 10. `None` where the table has no
+/// value.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PaperFigures {
     pub(super) points: &'static str,
     pub(super) pixels: &'static str,
     pub(super) kd_tree: Option<f64>,
     pub(super) splat_communication: f64,
-    /// With grid culling.
+    /// Time with grid culling.
     pub(super) culled: Option<f64>,
 }
 
@@ -52,11 +53,11 @@ enum Source {
     Generated(&'static str),
     /// All points of a file, seen from its front.
     File(PathBuf),
-    /// Horses at different moments of a gallop, from a folder with meshes of one topology.
+    /// Horses at different moments of a gallop, from a folder of meshes with one topology.
     Gallop(PathBuf),
 }
 
-/// The names of the scenes, as `--scenes` takes them.
+/// Names of the scenes for `--scenes`.
 pub(super) const NAMES: [&str; 4] = ["bunny", "imperia", "horses", "cathedral"];
 
 impl PaperScene {
@@ -88,23 +89,23 @@ impl PaperScene {
             }
         };
         let [width, height] = if quick { QUICK_SIZE } else { SIZE };
-        // The statue was rendered in portrait format.
+        // The paper shows the statue in portrait format.
         let size = if name == "imperia" { [height, width] } else { [width, height] };
         Self { name, paper, points: points[usize::from(quick)], size, source }
     }
 
-    /// What it is made of, for the report.
+    /// Origin of the points, for the report.
     pub(super) fn origin(&self) -> String {
         match &self.source {
-            Source::Generated(scene) => format!("a generated scene instead: `scene:{scene}:{}`", self.points),
+            Source::Generated(scene) => format!("generated substitute, `scene:{scene}:{}`", self.points),
             Source::File(path) => format!("all points of `{}`", file_name(path)),
             Source::Gallop(folder) => {
-                format!("{HORSES} moments of `{}`, {} points sampled from the surfaces", file_name(folder), self.points)
+                format!("{HORSES} moments of `{}`, {} points sampled on the surfaces", file_name(folder), self.points)
             }
         }
     }
 
-    /// What tells its measurements from others'.
+    /// Key of the scene in the journal.
     pub(super) fn key(&self) -> String {
         let source = match &self.source {
             Source::Generated(scene) => format!("{scene}:{}", self.points),
@@ -117,7 +118,7 @@ impl PaperScene {
         format!("{} ({source}, {width}x{height})", self.name)
     }
 
-    /// The files that it needs, for a check before the work begins.
+    /// File or folder of the scene, checked before the work begins.
     pub(super) fn file(&self) -> Option<&Path> {
         match &self.source {
             Source::Generated(_) => None,
@@ -125,7 +126,7 @@ impl PaperScene {
         }
     }
 
-    /// Its points, and the camera that shows them.
+    /// The points, and the camera that shows them.
     pub(super) fn load(&self, quiet: bool) -> Result<(PointCloud, Camera), Failure> {
         match &self.source {
             Source::Generated(scene) => generated(&format!("{scene}:{}", self.points), quiet),
@@ -136,7 +137,7 @@ impl PaperScene {
             }
             Source::Gallop(folder) => {
                 let (cloud, camera) = self.fitted(herd(folder, self.points, quiet)?, ViewDirection::Iso)?;
-                // The herd fills the picture and runs out of it, as the paper's pixel counts say it did there.
+                // The herd extends beyond the picture, which matches the paper's pixel counts.
                 Ok((cloud, Camera { projection: Projection::PerspectiveFovDeg(HERD_FOV_DEG), ..camera }))
             }
         }
@@ -157,11 +158,11 @@ fn file_name(path: &Path) -> String {
 /// A built-in scene, `NAME[:COUNT]`, and its camera.
 pub(super) fn generated(name: &str, quiet: bool) -> Result<(PointCloud, Camera), Failure> {
     let inputs = Inputs::scene(name)?;
-    let scene: &Scene = inputs.only_scene().ok_or_else(|| Failure::usage(format!("{name} is no scene")))?;
+    let scene: &Scene = inputs.only_scene().ok_or_else(|| Failure::usage(format!("{name} is not a scene")))?;
     Ok((inputs.read(quiet)?, scene_camera(scene)))
 }
 
-/// Horses in two rows at moments of one gallop, `count` points in all, strewn over their surfaces.
+/// Horses in rows of `ROW` at moments of one gallop, with `count` sampled points in all.
 fn herd(folder: &Path, count: usize, quiet: bool) -> Result<PointCloud, Failure> {
     let unreadable = |error: std::io::Error| Failure::new(Exit::Input, format!("{}: {error}", folder.display()));
     let mut files = Vec::new();
@@ -170,7 +171,7 @@ fn herd(folder: &Path, count: usize, quiet: bool) -> Result<PointCloud, Failure>
     }
     files.sort();
     if files.is_empty() {
-        return Err(Failure::new(Exit::Input, format!("{}: the folder has no files", folder.display())));
+        return Err(Failure::new(Exit::Input, format!("{}: there are no files in it", folder.display())));
     }
     let bar = Bar::new("resampling the gallop", quiet);
     let options = ReadOptions::default();
@@ -179,7 +180,7 @@ fn herd(folder: &Path, count: usize, quiet: bool) -> Result<PointCloud, Failure>
     let mut horses = Vec::new();
     for horse in 0..HORSES {
         autosplats_cloud::Progress::report(&bar, horse as f32 / HORSES as f32);
-        // Seven frames apart, so that neighbours are at different moments.
+        // Files seven frames apart show neighbours at different moments.
         let file = &files[horse * 7 % files.len()];
         let cloud = read_with(file, &options, &()).map_err(read_failure)?;
         let mesh = Contents { cloud, triangles: triangles.clone() };
