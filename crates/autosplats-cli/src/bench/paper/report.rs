@@ -56,7 +56,7 @@ impl Report<'_> {
         let folder = self.folder;
         let mut page = String::from("# The paper's evaluation, repeated\n\n");
         if self.quick {
-            page += "**A quick run: scenes and pictures are small, so the numbers mean little.**\n\n";
+            page += "**Quick run: scenes and pictures are small, and the figures are not representative.**\n\n";
         }
         page.push_str(
             "This page is written by `autosplats bench paper`; `autosplats bench paper --help` says how to repeat it. \
@@ -66,7 +66,9 @@ impl Report<'_> {
         for device in self.renderers.describe() {
             _ = writeln!(page, "- {device}");
         }
-        page += "\nScenes:\n\n| scene | points, paper | visible, paper | points here | picture | contents here |\n|---|--:|--:|--:|---|---|\n";
+        page += "\nScenes:\n\n\
+                 | scene | the paper's points | visible there | points here | picture | origin |\n\
+                 |---|--:|--:|--:|---|---|\n";
         for scene in self.scenes {
             let PaperScene { name, paper, size: [width, height], .. } = scene;
             let points = match self.timing(scene, Task::Table(Method::GridCpu, false)) {
@@ -102,11 +104,11 @@ impl Report<'_> {
     fn table_1(&self, page: &mut String) {
         _ = write!(
             page,
-            "\n## Table 1: finding the {K} nearest neighbours\n\nTimes are in milliseconds. Each is the median of up \
-             to {FRAMES} frames after a warm-up frame. A frame of more than three seconds is measured once, without \
-             warm-up. Rows with \\* use grid culling. Brackets give the microseconds for each point searched for: the \
-             reconstructed points, or all points for a kd-tree. A kd-tree holds all points and is built again for each \
-             frame; its time includes the build.\n\n\
+            "\n## Table 1: finding the {K} nearest neighbours\n\n\
+             Times in milliseconds, medians of up to {FRAMES} frames after a first one that does not count. A frame of \
+             more than three seconds is measured once. In brackets: microseconds per point searched for, which are the \
+             reconstructed points, or all points for a kd-tree. \\* marks grid culling. Kd-trees hold all points and \
+             are rebuilt in each frame, which is part of their time.\n\n\
              | scene | visible | reconstructed | paper: kd-tree | paper: Auto Splats |"
         );
         for method in Method::ALL {
@@ -148,28 +150,28 @@ impl Report<'_> {
 
     /// Explains why the times differ from the paper's.
     fn why_times_differ(&self, page: &mut String) {
-        *page += "\nWhy the times differ: the paper measured on a graphics card of 2012, which rasterises in hardware.";
+        *page += "\nWhy the times differ: the paper's figures come from a graphics card of 2012, which rasterises in \
+             hardware.";
         if self.renderers.is_software() {
-            *page += " The GPU here is software on the processor. It rasterises and blends with a few cores, and the \
-                      program waits for each pass. Its times say nothing about a graphics card. Ratios between its \
-                      columns may say something, except those of splat communication, which is the method that \
-                      rasterises.";
+            *page += " The GPU here is a software renderer: it rasterises and blends on a few processor cores and \
+                      waits after each pass. Its times say nothing about a graphics card. Ratios between its columns \
+                      may, except those of splat communication, which rasterises.";
         }
-        *page += " The screen grid works in another way than both rivals. Splat communication draws each neighbourhood \
-                  in about ten iterations; the screen grid reads it. A kd-tree searches for all points, because it \
-                  does not know which are visible; the screen grid searches for visible points only.\n";
+        *page += " The screen grid works differently from both: it reads neighbourhoods instead of drawing them in \
+                  about ten iterations, and it searches for visible points only, which a kd-tree of all points cannot \
+                  know.\n";
     }
 
     /// Speedups as in the paper: the kd-tree's time over that of another search, per point and overall.
     fn ratios(&self, page: &mut String) {
         *page += "\n### Ratios on one device\n\n\
-                  The ratios compare search times. *Overall* divides time by time. *By point*, as in the paper, first \
-                  divides the kd-tree's time by all points and the other time by the visible points. The paper's \
-                  ratios of its kd-tree over splat communication, by point and overall, are 1.47 and 1.56 (bunny), \
-                  1.37 and 2.57 (Imperia), 1.00 and 1.44 (horses), 1.64 and 2.38 (horses with culling). The kd-tree \
-                  here uses the fastest of several first radii that find 99.9 % of the k-radii.\n\n\
-                  | scene | kd-tree's first radius, accuracy | kd-tree over splat communication: by point | overall \
-                  | kd-tree over screen grid: by point | overall | splat communication over screen grid |\n\
+                  Ratios of search times. *Overall* is time over time. *By point*, as in the paper, divides the \
+                  kd-tree's time by all points and the other time by the visible points. The paper states for splat \
+                  communication against its kd-tree: bunny 1.47 by point and 1.56 overall, Imperia 1.37 and 2.57, \
+                  horses 1.00 and 1.44, with culling 1.64 and 2.38. The kd-tree uses the fastest of the tried first \
+                  radii that find 99.9 % of the k-radii.\n\n\
+                  | scene | kd-tree's first radius, accuracy | kd-tree over splat communication: by point | overall | \
+                  kd-tree over screen grid: by point | overall | splat communication over screen grid |\n\
                   |---|---|--:|--:|--:|--:|--:|\n";
         let mut missed = Vec::new();
         for scene in self.scenes {
@@ -221,15 +223,15 @@ impl Report<'_> {
             }
         }
         if !missed.is_empty() {
-            _ = writeln!(page, "\nExpectations that this run misses: {}.", missed.join("; "));
+            _ = writeln!(page, "\nTargets missed: {}.", missed.join("; "));
         }
     }
 
     fn culling(&self, page: &mut String) {
         *page += "\n## Grid culling\n\n\
-                  The table gives the search time with culling divided by the time without. The last column is the \
-                  share of pixels that culling changes by more than 2 of 255. In the paper, culling reduces 117 ms to \
-                  71 ms (0.61) for the horses and 264 ms to 123 ms (0.47) for the cathedral.\n\n\
+                  Search time with culling over search time without, and the pixels that culling changes by more than \
+                  two levels of 255. The paper has 71 instead of 117 ms (0.61) for the horses and 123 instead of 264 \
+                  ms (0.47) for the cathedral.\n\n\
                   | scene | paper |";
         for method in Method::ALL {
             _ = write!(page, " {} |", method.name());
@@ -255,23 +257,21 @@ impl Report<'_> {
             let differ: Option<f64> = self.journal.get(&Task::Culling.key(scene, self.renderers));
             _ = writeln!(page, " {} |", differ.map_or_else(|| "–".to_owned(), percent));
         }
-        *page += "\nWhy the ratios differ: culling saves the work for visible points that lie behind a surface. Table \
-                  1 shows their share: the visible points that are not reconstructed. Some points are hidden only by \
-                  splats that stick out of a silhouette. They are put back after the first depth map, because holes \
-                  would open there. Splat communication iterates again for these points. The paper does not say what \
-                  culling changes in its pictures.\n";
+        *page += "\nWhy the ratios differ: the saving depends on the number of visible points behind others, which \
+                  Table 1 shows (reconstructed out of visible). Points that the first depth map hides only by splats \
+                  beyond silhouettes are put back, as holes would open without them. Splat communication iterates \
+                  again for these points. The paper does not state what changes in its pictures.\n";
     }
 
     fn accuracy(&self, page: &mut String) {
         _ = write!(
             page,
             "\n## Accuracy\n\n\
-             The table gives the share of visible points with an exact neighbourhood: the k-radius is right to one \
-             part in ten thousand. *On the screen* means exact among the visible points, which is all that a search in \
-             the picture can find. *In space* means exact among all points of the cloud. A neighbourhood is *cut \
-             short* if it ends at a gap, at the bound on work, or because no point is near enough; such a \
-             neighbourhood is not exact. The last columns give the number of points searched for and of iterations. k \
-             = {K}, without culling.\n\n\
+             Fractions of the visible points with an exact neighbourhood, by a k-radius within 0.01 %. *On the screen* \
+             is among visible points, which a search in the picture can find. *In space* is among all points of the \
+             cloud: the difference is the price of searching in the picture, which the kd-tree does not pay. A \
+             neighbourhood that ends at a gap or at the limit of work, or that has no point near enough, is not exact \
+             but *cut short*. The last columns are the work. k = {K}, no culling.\n\n\
              | scene | method | exact on the screen | cut short | exact in space | points searched for | iterations |\n\
              |---|---|--:|--:|--:|--:|--:|\n"
         );
@@ -310,12 +310,11 @@ impl Report<'_> {
             page,
             "\n## Figure 6: normals on the fly and beforehand\n\n\
              ![on the fly; beforehand]({folder}/{FIGURE_6})\n\n\
-             Left: normals from the visible points, estimated for this frame. Right: normals from all points, \
-             estimated beforehand by the same estimator, k = {K}. The paper shows the pictures and observes \"a \
-             similar visualization\", with \"minor artifacts due to information loss at silhouettes\". Here the angle \
-             between both normals, over {points} points, has a mean of {mean:.2}°, a median of {median:.2}° and a root \
-             mean square of {rmse:.2}°. It is below 5° for {} of the points and below 10° for {}. The pictures are {} \
-             (PSNR).\n",
+             Left: normals computed on the fly, among the visible points. Right: normals precomputed among all points \
+             by the same estimator, k = {K}. The paper shows such pictures and observes \"a similar visualization\", \
+             with \"minor artifacts due to information loss at silhouettes\". Angles between both normals of {points} \
+             points: mean {mean:.2}°, median {median:.2}°, root mean square {rmse:.2}°; {} below 5°, {} below 10°. The \
+             pictures are {} (PSNR).\n",
             percent(within_5),
             percent(within_10),
             psnr.map_or_else(|| "equal".into(), |psnr| format!("{psnr:.1} dB apart"))
@@ -329,10 +328,10 @@ impl Report<'_> {
             page,
             "\n## Figure 7: two scales\n\n\
              ![surface; k-radius; single splats; nearer]({folder}/{FIGURE_7})\n\n\
-             The small body has as many points as the large one. The pictures show the surface, the k-radius in \
-             colours, splats made smaller so that each is visible, and the splats of the small body seven times as \
-             near. No parameter states a size. The median k-radius is {large:.4} on the large body and {small:.4} on \
-             the small one, a ratio of {:.1}.\n",
+             Both bodies have equally many points. The pictures show the surface, the k-radius in colours, shrunken \
+             splats that can be told apart, and those of the small body magnified seven times. No parameter states a \
+             scale: the median k-radius is {large:.4} on the large body and {small:.4} on the small one, {:.1} to \
+             one.\n",
             large / small
         );
     }
@@ -346,19 +345,17 @@ impl Report<'_> {
         _ = write!(
             page,
             "\n## Figure 9: curvature\n\n\
-                  ![the statue; nearer; its curvature]({folder}/{FIGURE_9})\n\n\
-                  The pictures show the statue, a part of it, and the surface variation of that part, which is \
-                  computed with the normals in the same frame.\n"
+             ![the statue; nearer; its curvature]({folder}/{FIGURE_9})\n\n\
+             The statue, a closer view, and the surface variation there, computed in the same frame as the normals.\n"
         );
     }
 
     fn figure_10(&self, page: &mut String) {
         *page += "\n## Figure 10: time per stage\n\n\
-                  The charts give the time of each stage for several k, with grid culling. The paper's chart has no \
-                  numbers: its search takes most of the time and grows with k, and fitting costs about as much as \
-                  splatting. Here the search takes most of the time with splat communication. With the screen grid it \
-                  does not, and fitting always costs less than splatting. Times are medians of up to five frames; a \
-                  frame of more than three seconds is measured once.\n\n";
+                  With grid culling, for several values of k. The paper's chart has no numbers; the search takes most \
+                  of the time and grows with k, and fitting costs about as much as splatting. Here the search takes \
+                  most of the time only with splat communication, and fitting always costs less than splatting. Times \
+                  are medians of up to five frames, or of one frame of more than three seconds.\n\n";
         let folder = self.folder;
         for scene in self.scenes {
             for method in Method::BY_STAGE {
@@ -380,10 +377,10 @@ impl Report<'_> {
             page,
             "\n## Figure 11: convergence of splat communication\n\n\
              ![points without a radius]({folder}/{CONVERGENCE})\n\n\
-             The chart shows how many points have no k-radius yet before each iteration; k = {K}, without culling. The \
-             paper needs 7 to 10 iterations for 99.9 % and observes that \"generally, 6–7 iterations already provide a \
-             good quality\". The table gives the percentage of points that converged here after each iteration.\n\n| \
-             scene |"
+             Points without a k-radius before each iteration, k = {K}, no culling. The paper states 7 to 10 iterations \
+             to 99.9 %, and \"generally, 6–7 iterations already provide a good quality\". Converged points here, in \
+             percent:\n\n\
+             | scene |"
         );
         // The paper's chart shows the remaining points in percent.
         let longest = lines.iter().map(|line| line.points.len()).max().unwrap_or(1);
@@ -427,7 +424,7 @@ impl Report<'_> {
             }
         }
         if !lines.is_empty() {
-            *page += "\n## What a device refused\n\n";
+            *page += "\n## Refused measurements\n\n";
             *page += &lines.join("\n");
             *page += "\n";
         }
@@ -445,7 +442,8 @@ impl Report<'_> {
 
     /// Writes the charts of the page.
     pub(super) fn write_charts(&self, folder: &Path) -> Result<(), Failure> {
-        let labels = Labels { title: "splat communication", x: "iteration", y: "points without a k-radius, %" };
+        let labels =
+            Labels { title: "splat communication", x: "iteration", y: "% of the points without a k-radius before it" };
         let lines = self.convergence();
         if !lines.is_empty() {
             let svg = log_lines(labels, &lines);
