@@ -268,9 +268,7 @@ impl Inputs {
     /// Plays a file or a folder as it changes.
     fn watch(&self, path: &Path, name: &str) -> Result<Player, Failure> {
         if self.play.sample.is_some() || self.play.scanners.is_some() {
-            return Err(Failure::usage(format!(
-                "--watch: {name} cannot be sampled or scanned; remove --strew and --scan"
-            )));
+            return Err(Failure::usage(format!("--watch: {name} cannot be sampled; leave out --strew and --scan")));
         }
         let stream = Live::watch(path, &self.options).map_err(read_failure)?;
         Ok(Player::new(Box::new(stream), self.play.latest.clone()))
@@ -280,9 +278,7 @@ impl Inputs {
     pub(crate) fn sample(&self, count: usize, seed: u64, quiet: bool) -> Result<PointCloud, Failure> {
         if let Some(input) = self.list.iter().find(|input| matches!(input.source, Source::Scene(..))) {
             let name = &input.name;
-            return Err(Failure::usage(format!(
-                "--sample: {name} is not a mesh; give a scene's number of points in its name: {name}:1M"
-            )));
+            return Err(Failure::usage(format!("--sample: {name} is not a mesh; set its point count as {name}:1M")));
         }
         self.read_each(quiet, |input, progress| match &input.source {
             Source::File(path) => sample_surface(&read_mesh(path, &self.options, progress)?, count, seed, &()),
@@ -352,9 +348,7 @@ fn tell_disagreements(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
         let unit = |cloud: &PointCloud| cloud.crs().unit;
         let units = others.iter().any(|(other, _)| unit(other) != unit(first));
         let what = if units { "coordinate systems and units" } else { "coordinate systems" };
-        parts[0].note(&format!(
-            "the inputs differ in their {what}; coordinates are not converted, and the result states none"
-        ));
+        parts[0].note(&format!("the inputs differ in their {what}; nothing is converted, the result has none"));
     }
 }
 

@@ -1,6 +1,6 @@
-//! A session in a real window, as somebody would have it: on a screen in memory, with Vulkan on the processor.
+//! A session in a real window, on a screen in memory and with Vulkan on the processor.
 //!
-//! Its pictures are left in `target/window-session`, for people to look at.
+//! Its screenshots stay in `target/window-session`.
 
 #![cfg(all(target_os = "linux", feature = "viewer"))]
 #![allow(missing_docs, reason = "a test")]
@@ -14,10 +14,10 @@ use std::time::Duration;
 
 use screen::{Picture, Screen, keys};
 
-/// How much two pictures of the same may differ, of 1: half a level.
+/// Largest difference of equal pictures, of 1: half a level.
 const SAME: f64 = 0.002;
 
-/// What is opened: the bunny where the data is, else a sphere.
+/// Input of the session: the bunny if the data is present, else a sphere.
 fn input(folder: &common::Folder) -> PathBuf {
     let bunny = common::data().map(|data| data.join("models/bunny.ply")).filter(|path| path.is_file());
     bunny.unwrap_or_else(|| {
@@ -26,7 +26,7 @@ fn input(folder: &common::Folder) -> PathBuf {
     })
 }
 
-/// Pixels of the selection's orange: much more red than blue.
+/// Fraction of pixels in the orange of the selection: much more red than blue.
 fn orange(picture: &Picture) -> f64 {
     picture.share(|[r, g, b]| r > 130 && r > g + 30 && g > b + 20)
 }
@@ -64,7 +64,7 @@ fn a_session_in_a_window() {
 
     screen.key(keys::X);
     screen.click(middle);
-    // The little window with what is known of the point is at the upper right.
+    // The panel about the inspected point is in the upper right corner.
     let corner = [970, 80, 1270, 300];
     screen.settled("5-inspected", |picture| picture.crop(corner).difference(&back.crop(corner)) > 0.05);
     screen.key(keys::ESCAPE);
@@ -93,7 +93,7 @@ fn a_session_in_a_window() {
         orange(&picture.crop(inside)) < 0.01 && picture.crop(inside).difference(&back.crop(inside)) > 0.05
     });
     screen.keys_with(keys::CTRL, keys::Z);
-    // The selection comes back with the points.
+    // Undo also restores the selection.
     screen.key(keys::ESCAPE);
     screen.key(keys::ESCAPE);
     let rest = [left, top, right, bottom - 130];
@@ -105,10 +105,10 @@ fn a_session_in_a_window() {
     folder.write("view.json", &copied);
     screen.keys_with(keys::CTRL, keys::S);
     screen.settled("11-dialog", |picture| picture.crop(view).difference(&undone.crop(view)) > 0.02);
-    // The line for the name has the keyboard, and Enter does what the dialog is for.
+    // The name field has the keyboard focus; Enter confirms the dialog.
     screen.key(keys::ENTER);
     let saved = folder.path("picture.png");
-    // It appears as a whole.
+    // The file appears complete.
     screen.wait("12-saved", Duration::from_secs(120), |_| saved.is_file()).expect("the picture is written");
     screen.keys_with(keys::CTRL, keys::Q);
     let code = screen.finish();
@@ -118,12 +118,12 @@ fn a_session_in_a_window() {
     let view = ["--camera", "view.json", "--size", "1920x1080", "--backend", "cpu", "-o", "rendered.png"];
     folder.succeed(&[&["render", path][..], &view].concat());
     let [seen, rendered] = ["picture.png", "rendered.png"].map(|name| Picture::read(&folder.path(name)));
-    // The same camera to the last bit; what differs is how the two choose what they do not say.
+    // Both cameras are bit-identical; the pictures differ only in default settings.
     assert!(seen.spread() > 20.0, "something is seen");
     assert!(seen.difference(&rendered) < SAME, "render makes the same picture: {}", seen.difference(&rendered));
 }
 
-/// What the screen shows without a program.
+/// An empty screen has one colour.
 #[test]
 fn an_empty_screen_shows_nothing() {
     let Some(mut screen) = Screen::start([320, 200]) else { return };

@@ -1,4 +1,5 @@
-//! `cargo xtask formats`: docs/FORMATS.md, from what the program itself says of its formats and of the test data.
+//! `cargo xtask formats`: writes docs/FORMATS.md from the program's own description of its formats and from the test
+//! data.
 
 mod outcome;
 mod words;
@@ -17,10 +18,7 @@ use crate::{FEATURES, cargo_command};
 use self::outcome::{Outcome, Row};
 use self::words::{FILES, HEAD, WORDS};
 
-/// The document, from the repository's root.
-const DOCUMENT: &str = "docs/FORMATS.md";
-
-/// Files that go with point files: documentation, poses, pictures. The folder's own README describes them.
+/// Files that accompany point files, with what they are.
 const COMPANIONS: [(&str, &str); 4] = [
     ("README.md", "documentation"),
     (".conf", "poses of scans"),
@@ -28,51 +26,33 @@ const COMPANIONS: [(&str, &str); 4] = [
     ("color_", "colour picture"),
 ];
 
-/// Writes the document.
-pub(crate) fn write(root: &Path, program: &Path) -> Result<()> {
-    let target = root.join(DOCUMENT);
-    std::fs::write(&target, document(root, program)?).with_context(|| target.display().to_string())?;
+/// Writes the document. With `check`, only compares it with the existing one.
+pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
+    let program = build(root)?;
+    let data = std::env::var_os("AUTOSPLATS_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
+    let data = data.canonicalize().with_context(|| format!("{}: the test data is needed", data.display()))?;
+
+    let mut document = HEAD.to_owned();
+    formats(&program, &mut document)?;
+    schema(&program, &mut document)?;
+    files(&program, &data, &mut document)?;
+
+    let target = root.join("docs/FORMATS.md");
+    if check {
+        let there = read_to_string(&target).unwrap_or_default();
+        ensure!(there == document, "docs/FORMATS.md is not up to date; write it with cargo xtask formats");
+        println!("docs/FORMATS.md is up to date");
+        return Ok(());
+    }
+    std::fs::write(&target, document).with_context(|| target.display().to_string())?;
     println!("{}", target.display());
     Ok(())
 }
 
-/// Checks that the document is what this build writes. Where there is no data this says that nothing is checked; where `CI` is set
-/// it fails.
-pub(crate) fn check(root: &Path, program: &Path) -> Result<()> {
-    if data(root).is_err() && std::env::var_os("CI").is_none() {
-        println!("the test data are absent: {DOCUMENT} is not checked");
-        return Ok(());
-    }
-    let there = read_to_string(root.join(DOCUMENT)).unwrap_or_default();
-    let document = document(root, program)?;
-    let differing = there.lines().zip(document.lines()).find(|(there, new)| there != new);
-    if let Some((there, new)) = differing {
-        println!("there: {there}\nmade:  {new}");
-    }
-    ensure!(there == document, "{DOCUMENT} is not what this build makes; cargo xtask formats writes it");
-    println!("{DOCUMENT} is up to date");
-    Ok(())
-}
-
-fn data(root: &Path) -> Result<PathBuf> {
-    let data = std::env::var_os("AUTOSPLATS_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
-    data.canonicalize().with_context(|| format!("{}: the test data are needed", data.display()))
-}
-
-fn document(root: &Path, program: &Path) -> Result<String> {
-    let mut document = HEAD.to_owned();
-    formats(program, &mut document)?;
-    schema(program, &mut document)?;
-    files(program, &data(root)?, &mut document)?;
-    Ok(document)
-}
-
-/// Builds the command as the tests have it, and returns where it is.
-pub(crate) fn build(root: &Path) -> Result<PathBuf> {
-    let mut command = cargo_command(root);
-    command
-        .args(["build", "--locked", "--workspace", "--bin", "autosplats", "--message-format", "json"])
-        .args(FEATURES);
+/// Builds the command and returns its path.
+fn build(root: &Path) -> Result<PathBuf> {
+    let mut command = Command::new("cargo");
+    command.current_dir(root).args(["build", "--package", "autosplats-cli", "--message-format", "json"]);
     let output = command.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
     ensure!(output.status.success(), "cargo build: {}", output.status);
     let messages = String::from_utf8(output.stdout)?;
@@ -80,10 +60,10 @@ pub(crate) fn build(root: &Path) -> Result<PathBuf> {
         let message: Value = serde_json::from_str(line).ok()?;
         Some(PathBuf::from(message["executable"].as_str()?))
     });
-    programs.next_back().context("cargo builds no program")
+    programs.next_back().context("cargo built no program")
 }
 
-/// The tables of formats, read and written.
+/// Writes the tables of formats, read and written.
 fn formats(program: &Path, document: &mut String) -> Result<()> {
     let output = Command::new(program).args(["doctor", "--json"]).output().context("cannot start the program")?;
     let found: Value = serde_json::from_slice(&output.stdout).context("doctor --json")?;
@@ -92,7 +72,7 @@ fn formats(program: &Path, document: &mut String) -> Result<()> {
     for format in list("read") {
         let (name, extensions) = name_and_extensions(&format);
         let Some(words) = WORDS.iter().find(|words| words.name == name) else {
-            bail!("xtask/src/formats/words.rs does not describe the format {name}");
+            bail!("format {name}: describe it in xtask/src/formats/words.rs");
         };
         let _ = writeln!(document, "| {name} | {extensions} | {} | {} |", words.kept, words.not_kept);
     }
@@ -112,7 +92,7 @@ fn name_and_extensions(format: &Value) -> (&str, String) {
     (format["name"].as_str().unwrap_or_default(), extensions.join(" "))
 }
 
-/// What the program's help says of its JSON.
+/// Copies the description of the JSON from the program's help.
 fn schema(program: &Path, document: &mut String) -> Result<()> {
     let output = Command::new(program).args(["info", "--help"]).output().context("cannot start the program")?;
     let help = String::from_utf8(output.stdout)?;
@@ -124,7 +104,7 @@ fn schema(program: &Path, document: &mut String) -> Result<()> {
     Ok(())
 }
 
-/// The table of files.
+/// Writes the table of files.
 fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
     let mut names = Vec::new();
     collect(data, data, &mut names)?;
@@ -141,7 +121,7 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
         }
         let outcome = Outcome::of(program, data, &name, &pictures.path().join("picture.png"))?;
         if name.ends_with(".mcap") && !name.contains("lfs") {
-            others.entry("recordings, which the program plays".into()).or_default().push(name);
+            others.entry("recordings (played)".into()).or_default().push(name);
             continue;
         }
         match rows.last_mut().filter(|row| row.continues(&name, &outcome)) {
@@ -151,7 +131,8 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
     }
     document.push('\n');
     document.push_str(FILES);
-    document.push_str("\n| file | format | points | attributes | bounds: min .. max | unit, coordinate system | sensors | warnings or error | rendered |\n");
+    document
+        .push_str("\n| file | format | points | attributes | bounds | unit, system | sensors | notes | rendered |\n");
     document.push_str("|---|---|---|---|---|---|---|---|---|\n");
     rows.iter().for_each(|row| document.push_str(&row.to_markdown()));
     let points: usize = rows.iter().map(Row::files).sum();
@@ -167,7 +148,7 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
     Ok(())
 }
 
-/// The names of all files below `folder`, relative to `data`, in order.
+/// Names of all files below `folder`, relative to `data`, in order.
 fn collect(data: &Path, folder: &Path, names: &mut Vec<String>) -> Result<()> {
     for entry in read_dir(folder).with_context(|| folder.display().to_string())? {
         let path = entry?.path();

@@ -1,4 +1,4 @@
-//! What became of one file, and of several equal ones in a row.
+//! Result of one file, or of several equal ones in sequence.
 
 use std::fmt::Write as _;
 use std::io::Read as _;
@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result};
 use serde_json::Value;
 
-/// Time after which a command is ended: none should take so long.
+/// Time limit of a command.
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// What the program says of a file.
+/// Results of `info` and `render` for a file.
 pub(super) struct Outcome {
     report: Value,
     /// Why there is no report, or no picture.
@@ -21,7 +21,7 @@ pub(super) struct Outcome {
 }
 
 impl Outcome {
-    /// Asks the program about a file of `data`, and for its picture.
+    /// Examines and renders a file of `data`.
     pub(super) fn of(program: &Path, data: &Path, name: &str, picture: &Path) -> Result<Self> {
         let info = run(program, data, &["info", "--scan", "--json", "--quiet", name])?;
         let report: Value =
@@ -43,12 +43,12 @@ impl Outcome {
         Ok(Self { report, error, rendered })
     }
 
-    /// Whether no reader takes the file.
+    /// Whether no reader accepts the file.
     pub(super) fn is_unknown(&self) -> bool {
         self.error.as_ref().is_some_and(|error| error.contains("unknown format"))
     }
 
-    /// What has to be equal for files to share a row: all but numbers of points, bounds and what notes count.
+    /// Values that files of one row share: all except numbers of points, bounds and digits in notes.
     fn kind(&self) -> [String; 5] {
         let without_digits = |text: String| text.chars().filter(|c| !c.is_ascii_digit()).collect();
         [self.format(), self.attributes(), self.system(), without_digits(self.notes()), self.rendered.to_string()]
@@ -67,7 +67,7 @@ impl Outcome {
         list.filter_map(|attribute| attribute["name"].as_str()).collect::<Vec<_>>().join(" ")
     }
 
-    /// Least and greatest coordinates.
+    /// Smallest and largest coordinates.
     fn bounds(&self) -> Option<[[f64; 3]; 2]> {
         let end = |which: &str| {
             let values = self.report["bounds"][which].as_array()?;
@@ -98,7 +98,7 @@ impl Outcome {
     }
 }
 
-/// A row of the table: a file, or several equal ones.
+/// A row of the table: one file, or several equal ones.
 pub(super) struct Row {
     first: String,
     last: String,
@@ -114,10 +114,10 @@ impl Row {
         Self { last: name.clone(), first: name, files: 1, points, bounds: outcome.bounds(), outcome }
     }
 
-    /// Whether a file is the next of a sequence that this row shows.
+    /// Whether a file continues the sequence of this row.
     pub(super) fn continues(&self, name: &str, outcome: &Outcome) -> bool {
         let pattern = |name: &str| name.replace(|c: char| c.is_ascii_digit(), "0");
-        // Digits in the names of folders and extensions are no numbers of frames.
+        // Digits number the frames, so names are compared with every digit replaced by 0.
         pattern(name) == pattern(&self.first) && outcome.kind() == self.outcome.kind()
     }
 
@@ -184,7 +184,7 @@ impl Row {
     }
 }
 
-/// A number with seven digits, as many as the data's own table has.
+/// Formats a number with seven digits, like the data's own table.
 fn seven_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
@@ -194,21 +194,22 @@ fn seven_digits(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
-/// What a command left behind.
+/// Exit code and output of a command.
 struct Ended {
-    /// Nothing if a signal ended it.
+    /// `None` if a signal ended the command.
     code: Option<i32>,
     stdout: String,
     stderr: String,
 }
 
-/// Runs the program in the folder of the data, so that no message has the machine's paths; nothing if it takes too long.
+/// Runs the program in the folder of the data, so that messages contain no absolute paths. Returns `None` after
+/// `LIMIT`.
 fn run(program: &Path, data: &Path, arguments: &[&str]) -> Result<Option<Ended>> {
     let mut command = Command::new(program);
     command.current_dir(data).args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().context("cannot start the program")?;
     let (mut stdout, mut stderr) = (child.stdout.take().context("a pipe")?, child.stderr.take().context("a pipe")?);
-    // Both are read while it runs: a full pipe would stop it.
+    // Both pipes are read while the program runs, since a full pipe would block it.
     let read_out = std::thread::spawn(move || {
         let mut text = String::new();
         stdout.read_to_string(&mut text).map(|_| text)

@@ -1,4 +1,4 @@
-//! Exit codes 3 to 6 and 130: inputs, outputs and machines that do not play along.
+//! Exit codes 3 to 6 and 130: bad inputs, outputs and devices.
 
 use crate::common::{FRONT, Folder, points_ply};
 
@@ -11,7 +11,7 @@ fn clouds_that_show_nothing() {
     let folder = Folder::new();
     let cases: &[(&str, &[&str])] = &[
         ("no_points", &[]),
-        // Fewer are a dot.
+        // Fewer than 64 points are drawn as dots.
         ("all_equal", &["1 2 3"; 64]),
         ("not_finite", &["nan 0 0", "0 inf 0", "0 0 -inf", "nan nan nan"]),
     ];
@@ -121,7 +121,7 @@ fn a_gpu_that_is_not_there() {
     let folder = Folder::with_sphere();
     for arguments in [&render("sphere.ply")[..], &["bench"]] {
         let mut command = folder.command(&[arguments, &["--backend", "gpu"]].concat());
-        // Vulkan's loader looks here and nowhere else.
+        // Vulkan's loader looks for drivers only here.
         let output =
             command.env("VK_DRIVER_FILES", "absent").env("VK_ICD_FILENAMES", "absent").output().expect("it starts");
         let error = String::from_utf8_lossy(&output.stderr);

@@ -2,7 +2,7 @@
 
 use crate::common::{Folder, SPHERE_POINTS};
 
-/// The number of points that a PLY file claims.
+/// Number of points that a PLY file's header states.
 fn points(file: &[u8]) -> usize {
     let text = String::from_utf8_lossy(file);
     let line = text.lines().find_map(|line| line.strip_prefix("element vertex "));

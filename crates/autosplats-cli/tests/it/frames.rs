@@ -1,11 +1,11 @@
-//! What `render` makes of points that move.
+//! `render` of points that move.
 
 #[cfg(unix)]
 use crate::common::KEEP;
 use crate::common::{Folder, Outcome};
 use serde_json::Value;
 
-/// A folder of `sweep`, four frames of a sheet that climbs, and whatever else is put there.
+/// A folder with `sweep`, four frames of a rising sheet.
 fn folder() -> Folder {
     let folder = Folder::new();
     std::fs::create_dir(folder.path("sweep")).expect("a folder");
@@ -138,7 +138,7 @@ fn a_film_needs_ffmpeg_and_says_so() {
 #[test]
 fn no_picture_takes_the_place_of_an_input() {
     let folder = folder();
-    // The third of them is a frame.
+    // The third picture is a link to a frame.
     std::fs::copy(folder.path("sweep/scan_2.xyz"), folder.path("kept.xyz")).expect("a copy");
     #[cfg(unix)]
     {
@@ -158,7 +158,7 @@ fn no_picture_takes_the_place_of_an_input() {
 #[test]
 fn a_picture_that_cannot_be_written_is_not_told_of() {
     let folder = folder();
-    // A folder that is in the way of the third.
+    // A folder blocks the third picture.
     std::fs::create_dir(folder.path("f_2.png")).expect("a folder");
     let out = folder.run(&["render", "sweep", "--size", "120x90", "--quiet", "--json", "-o", "f_%d.png"]);
     assert_eq!(out.code, Some(4), "{}", out.stderr);
@@ -166,7 +166,7 @@ fn a_picture_that_cannot_be_written_is_not_told_of() {
     assert_eq!(pictures(&folder), ["f_0.png", "f_1.png", "f_2.png"], "and nothing after it");
 }
 
-/// Renders a film with a shell script in the place of ffmpeg.
+/// Renders a film with a shell script as ffmpeg.
 #[cfg(unix)]
 fn film(folder: &Folder, script: &str, arguments: &[&str]) -> Outcome {
     let mut command = folder.command(&[&["render"][..], arguments, &["--size", "40x30", "-o", "f.mp4"]].concat());
@@ -180,7 +180,7 @@ fn film_pictures(folder: &Folder) -> Vec<Vec<u8>> {
     folder.read("f.mp4").chunks(4 * 40 * 30).map(<[u8]>::to_vec).collect()
 }
 
-/// A recording of a sheet that climbs, at these milliseconds: MCAP without chunks, in messages of ROS 1.
+/// A recording of a rising sheet at these milliseconds: MCAP without chunks, in ROS 1 messages.
 fn recording(times: &[u64]) -> Vec<u8> {
     let text = |text: &str| [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
     let record = |kind: u8, parts: &[&[u8]]| {
@@ -253,7 +253,7 @@ fn a_film_shows_each_frame_for_as_long_as_it_lasts() {
     assert_eq!(out.code, Some(0), "{}", out.stderr);
     let lines: Vec<Value> = out.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let shown: Vec<_> = lines.iter().map(|line| (line["frame"].as_u64(), line["pictures"].as_u64())).collect();
-    // Pictures are those of 0, 0.1, 0.2 s and so on; the last frame is shown for the mean of the steps.
+    // Pictures show 0, 0.1, 0.2 s and so on. The last frame is shown for the mean duration.
     assert_eq!(shown, [(Some(0), Some(1)), (Some(1), Some(4)), (Some(2), Some(1)), (Some(3), Some(1))]);
     let pictures = film_pictures(&folder);
     assert_eq!(pictures.len(), 7, "0.69 s");

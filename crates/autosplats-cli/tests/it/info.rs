@@ -1,9 +1,9 @@
-//! `info`: what it says of files, as text and as JSON.
+//! `info`: its reports as text and as JSON.
 
 use crate::common::{Folder, SPHERE_POINTS, data, ply, points_ply};
 use serde_json::Value;
 
-/// A flat grid of 50 x 40 points, a quarter unit apart, at survey coordinates; a fifth is ground, the rest buildings.
+/// A flat grid of 50 x 40 points, 0.25 units apart, at survey coordinates. A fifth is ground, the rest buildings.
 fn grid_ply() -> String {
     let rows = (0..2000).map(|i| {
         let (x, y) = (500_000.0 + f64::from(i % 50) * 0.25, 5_400_000.0 + f64::from(i / 50) * 0.25);
@@ -164,7 +164,7 @@ fn notes_and_contradictions_are_warnings() {
 
 #[test]
 fn text_has_the_digits_that_it_has() {
-    // Whatever type it declares: these are finer than that type could be.
+    // The text has more digits than the declared type.
     let folder = Folder::new();
     let rows: Vec<String> =
         (0..100).map(|i| format!("{} {} 1", 5_400_000.0 + 0.125 * f64::from(i / 10), i % 10)).collect();
@@ -242,7 +242,7 @@ fn the_schema_is_documented() {
 fn real_scans_are_what_others_say() {
     let Some(data) = data() else { return };
     let folder = Folder::new();
-    // Points, least and greatest coordinates, duplicates, points without a place: as counted by other programs.
+    // Points, bounds, duplicates and points without a finite position, as counted by other programs.
     let known = [
         ("models/bunny.ply", 35_947, [-0.0946899, 0.0329874, -0.0618736, 0.0610091, 0.187321, 0.0587997], 0, 0),
         ("scans/autzen_trim.laz", 110_000, [636_001.8, 848_935.2, 406.26, 637_179.2, 849_497.9, 520.51], 0, 0),
@@ -275,7 +275,7 @@ fn real_scans_are_what_others_say() {
         assert_eq!(report["not_finite"], not_finite, "{name}: points without a place");
         for (axis, expected) in ends.into_iter().enumerate() {
             let found = report["bounds"][["min", "max"][axis / 3]][axis % 3].as_f64().expect("a number");
-            // They are printed with seven digits.
+            // The reference values have seven digits.
             assert!((found - expected).abs() <= expected.abs() * 1e-6, "{name}: {found}, not {expected}");
         }
     }

@@ -1,7 +1,7 @@
-//! Ten minutes of live points, from the message that is sent to the picture: 100,000 points (2.4 MB) twenty times a second over
-//! Zenoh on this machine, sent by another program. A measurement, which needs that program and a machine that does nothing
-//! else; AUTOSPLATS_LIVE_SECONDS says how long, 600 if it does not:
-//! `AUTOSPLATS_PYTHON=... cargo test --release -p autosplats-cli --features zenoh --test it live_pictures:: -- --ignored --nocapture`.
+//! Measures ten minutes of live points from the sent message to the picture. Another program sends 100,000 points (2.4
+//! MB) twenty times per second over Zenoh on this machine. The measurement needs that program and an otherwise idle
+//! machine. AUTOSPLATS_LIVE_SECONDS sets the duration; the default is 600: `AUTOSPLATS_PYTHON=... cargo test --release
+//! -p autosplats-cli --features zenoh --test it live_pictures:: -- --ignored --nocapture`.
 
 use std::{
     io::{BufRead as _, BufReader},
@@ -23,29 +23,29 @@ use autosplats::{
 };
 
 const POINTS: usize = 100_000;
-/// Of the first hundred pictures; those that follow get smaller, in a few steps of as many.
+/// Size of the first `FIRST` pictures. The size may then shrink in up to `STEPS` steps, each after as many pictures.
 const SIZE: [u32; 2] = [960, 540];
 const FIRST: usize = 100;
 const STEPS: usize = 3;
-/// Milliseconds from message to message.
+/// Milliseconds between messages.
 const PERIOD: f64 = 50.0;
-/// Share of it that a picture may take, as in the window.
+/// Fraction of the period that a picture may take, as in the window.
 const SHARE: f64 = 0.6;
-/// Megabytes that memory may grow by from the end of the first minute to the end.
+/// Largest growth of memory from the first minute to the end, in megabytes.
 const GROWTH: f64 = 20.0;
 
 fn now() -> i64 {
     UNIX_EPOCH.elapsed().unwrap().as_nanos() as i64
 }
 
-/// Megabytes of memory that this process has.
+/// Resident memory of this process in megabytes.
 fn resident() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
     line.trim().trim_end_matches(" kB").parse::<f64>().unwrap() / 1024.0
 }
 
-/// Median, 95 and 99 of 100, and the most.
+/// Median, 95th and 99th percentile, and maximum.
 fn percentiles(values: &[f64]) -> [f64; 4] {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -91,7 +91,7 @@ fn ten_minutes_of_live_points_become_pictures() {
         let cloud = latest.cloud();
         assert_eq!(cloud.len(), POINTS, "whole");
         if since_taken.len() == FIRST && steps < STEPS {
-            // Those of the first second are of a program that has just begun.
+            // The first second is left out, since the program has just started.
             let [median, ..] = percentiles(&since_taken[FIRST / 5..]);
             println!(
                 "{} x {}: {}; from taking {median:.1}",

@@ -1,4 +1,4 @@
-//! The command as a user runs it, in one program of tests: each further one is linked for itself.
+//! Tests of the command as a user runs it. They form one program, since linking each test separately takes long.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 

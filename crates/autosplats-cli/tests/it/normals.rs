@@ -2,7 +2,7 @@
 
 use crate::common::{Folder, SPHERE_POINTS};
 
-/// The values of a binary PLY of bytes, floats and doubles, one row per point, and the names of its properties.
+/// Values of a binary PLY of bytes, floats and doubles, one row per point, and the names of its properties.
 fn rows(file: &[u8]) -> (Vec<String>, Vec<Vec<f32>>) {
     let end = file.windows(11).position(|window| window == b"end_header\n").expect("a header that ends") + 11;
     let header = String::from_utf8_lossy(&file[..end]);
@@ -51,7 +51,7 @@ fn a_sphere_has_its_own_normals() {
         let cosine = row[x] * row[nx] + row[y] * row[ny] + row[z] * row[nz];
         assert!(cosine > 0.995, "a unit sphere's normal is its point, outward: {cosine}");
         assert!((0.0..0.02).contains(&row[curvature]), "nearly flat: {}", row[curvature]);
-        // 6000 points on 4 pi: each covers a circle of radius 0.026.
+        // 6000 points on an area of 4 pi: each covers a circle of radius 0.026.
         assert!((0.03..0.09).contains(&row[radius]), "about twice 0.026: {}", row[radius]);
     }
 }

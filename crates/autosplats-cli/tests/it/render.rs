@@ -1,4 +1,4 @@
-//! What `render` writes: pictures, layers, cameras and reports.
+//! Output of `render`: pictures, layers, cameras and reports.
 
 use crate::common::{FRONT, Folder, SPHERE_POINTS, ply, sphere_point};
 use exr::prelude::{AnyChannels, FlatSamples, read_first_flat_layer_from_file};
@@ -18,7 +18,7 @@ fn png(folder: &Folder, name: &str) -> DynamicImage {
     image
 }
 
-/// The values of a channel, row by row.
+/// Values of a channel, row by row.
 fn channel<'a>(channels: &'a AnyChannels<FlatSamples>, name: &str) -> &'a FlatSamples {
     let found = channels.list.iter().find(|channel| channel.name.to_string() == name);
     &found.unwrap_or_else(|| panic!("there is a channel {name}")).sample_data
@@ -215,7 +215,7 @@ fn frames_are_as_bright_as_the_first() {
     let outcome = folder.succeed(&["render", "f_*.ply", "--size", "160x120", "-o", "p_%d.png"]);
     let [first, second] = ["p_0.png", "p_1.png"].map(brightness);
     assert!(outcome.stderr.contains("--exposure 1"), "it is told: {}", outcome.stderr);
-    // Both are dark enough to be lifted to the same brightness, each by itself.
+    // Both are dark enough that each alone would be raised to the same brightness.
     assert!(first > 130 && second > first + 30, "{first}, then {second}");
 }
 

@@ -1,4 +1,4 @@
-//! What `render` makes of points that come while it runs.
+//! `render` of live points.
 
 use std::io::Write as _;
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
@@ -13,7 +13,7 @@ fn sheet(height: usize) -> String {
     points_ply(&points.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// Starts `render` with pipes for all it reads and says.
+/// Starts `render` with pipes for input and output.
 fn start(folder: &Folder, arguments: &[&str]) -> Child {
     let mut command: Command = folder.command(&[&["render"][..], arguments, &["--size", "60x40"]].concat());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts")
@@ -23,7 +23,7 @@ fn input(child: &mut Child) -> ChildStdin {
     child.stdin.take().expect("a pipe")
 }
 
-/// Waits until there is a file.
+/// Waits until a file exists.
 fn wait_for(folder: &Folder, name: &str) {
     let begun = Instant::now();
     while !folder.path(name).exists() {
@@ -51,7 +51,7 @@ fn each_update_has_a_picture_as_it_comes() {
     let mut pipe = input(&mut child);
     for height in 0..3 {
         let file = sheet(height * 5);
-        // In two parts, between which nothing may be shown.
+        // The file comes in two parts, between which nothing may be shown.
         let (first, rest) = file.split_at(file.len() / 2);
         pipe.write_all(first.as_bytes()).expect("it reads");
         pipe.flush().expect("it reads");
@@ -75,7 +75,7 @@ fn so_many_are_enough() {
     let folder = Folder::new();
     let mut child = start(&folder, &["-", "--frames", "1..2", "-o", "f_%d.png", "--quiet"]);
     let mut pipe = input(&mut child);
-    // Until it reads no more.
+    // The command stops reading once it has its pictures.
     while pipe.write_all(sheet(1).as_bytes()).is_ok() && child.try_wait().expect("it runs").is_none() {
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -116,7 +116,7 @@ fn ctrl_c_ends_it_and_leaves_whole_files() {
     assert!(stderr.contains("1 picture;"), "{stderr}");
 
     let mut child = start(&folder, &["-", "-o", "g_%d.png"]);
-    // Held open, as the end of the pipe would be another reason to end.
+    // The pipe stays open, since its end would also end the command.
     let _pipe = input(&mut child);
     std::thread::sleep(Duration::from_millis(500));
     press_ctrl_c(&child);
@@ -147,7 +147,7 @@ fn a_film_of_what_is_live_takes_as_long_as_it_took() {
     let shown: Vec<u64> = lines.iter().filter_map(|line| line["pictures"].as_u64()).collect();
     let all: u64 = shown.iter().sum();
     assert_eq!(folder.read("f.mp4").len() as u64, all * 40 * 30 * 4, "as many as are told of");
-    // 2.6 s are 78 pictures, fewer by as much as the first one was late on a busy machine.
+    // 2.6 s are 78 pictures, minus the delay of the first picture on a busy machine.
     assert!(shown.len() == 2 && all >= 30 && all as f64 <= 30.0 * took + 2.0, "{shown:?} in {took} s");
 }
 

@@ -1,4 +1,4 @@
-//! Exit code 2: what was typed does not exist or does not fit, and the message says what would.
+//! Exit code 2: unknown or unsuitable arguments. The message names a remedy.
 
 use crate::common::{FRONT, Folder};
 
@@ -125,7 +125,7 @@ fn builds_without_a_viewer_say_so() {
     folder.fail(&["sphere.ply"], 2, &["no viewer", "autosplats render sphere.ply"]);
 }
 
-/// Tests run without a screen: the command says so, and what to do.
+/// Tests run without a screen, and the message names the remedy.
 #[test]
 #[cfg(all(feature = "viewer", target_os = "linux"))]
 fn windows_need_a_screen() {

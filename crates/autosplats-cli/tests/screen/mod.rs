@@ -1,4 +1,4 @@
-//! A screen in memory, with a mouse, a keyboard and a camera.
+//! A screen in memory, with mouse, keyboard and screenshots.
 
 use std::io::{BufRead as _, BufReader, IoSlice, Read as _};
 use std::path::{Path, PathBuf};
@@ -12,12 +12,12 @@ use x11rb::protocol::xproto::{
 };
 use x11rb::rust_connection::RustConnection;
 
-/// What a machine with much else to do may take for a step.
+/// Longest time of a step on a busy machine.
 const WAIT: Duration = Duration::from_secs(120);
-/// Time between two looks.
+/// Time between two screenshots.
 const LOOK: Duration = Duration::from_millis(400);
 
-/// Keys by their symbols.
+/// X11 symbols of keys.
 pub(crate) mod keys {
     pub(crate) const TAB: u32 = 0xff09;
     pub(crate) const ENTER: u32 = 0xff0d;
@@ -33,7 +33,7 @@ pub(crate) mod keys {
     pub(crate) const Z: u32 = 'z' as u32;
 }
 
-/// What is on the screen, or a part of it.
+/// A screenshot, or a part of one.
 #[derive(Clone, PartialEq)]
 pub(crate) struct Picture {
     width: usize,
@@ -63,26 +63,26 @@ impl Picture {
         (self.levels().map(|level| (level - mean).powi(2)).sum::<f64>() / self.pixels.len() as f64).sqrt()
     }
 
-    /// Mean difference of levels of neighbours in a row.
+    /// Mean level difference of horizontal neighbours.
     pub(crate) fn roughness(&self) -> f64 {
         let levels: Vec<f64> = self.levels().collect();
         let steps = levels.chunks(self.width).flat_map(|row| row.windows(2).map(|pair| (pair[0] - pair[1]).abs()));
         steps.sum::<f64>() / levels.len() as f64
     }
 
-    /// Mean difference to another picture of the same size, 0 to 1.
+    /// Mean difference from another picture of the same size, 0 to 1.
     pub(crate) fn difference(&self, other: &Self) -> f64 {
         assert_eq!(self.pixels.len(), other.pixels.len(), "pictures of one size are compared");
         let pairs = self.pixels.as_flattened().iter().zip(other.pixels.as_flattened());
         pairs.map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / (255.0 * 3.0 * self.pixels.len() as f64)
     }
 
-    /// Share of the pixels that are so.
+    /// Fraction of the pixels that satisfy `is`.
     pub(crate) fn share(&self, is: impl Fn([u8; 3]) -> bool) -> f64 {
         self.pixels.iter().filter(|&&pixel| is(pixel)).count() as f64 / self.pixels.len() as f64
     }
 
-    /// A picture from a file.
+    /// Reads a picture from a file.
     pub(crate) fn read(path: &Path) -> Self {
         let picture = image::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display())).to_rgb8();
         Self { width: picture.width() as usize, pixels: picture.pixels().map(|pixel| pixel.0).collect() }
@@ -96,7 +96,7 @@ impl Picture {
     }
 }
 
-/// The screen and the program that runs on it; both end with it.
+/// The screen and the program on it. Both end when this is dropped.
 pub(crate) struct Screen {
     server: Child,
     name: String,
@@ -121,7 +121,7 @@ impl Drop for Screen {
 }
 
 impl Screen {
-    /// A screen of a size. None where there can be none, which is an error in CI.
+    /// Starts a screen of this size. Returns `None` where Xvfb is missing, which fails in CI.
     pub(crate) fn start([width, height]: [u16; 2]) -> Option<Self> {
         let mut command = Command::new("Xvfb");
         command.args(["-displayfd", "1", "-nolisten", "tcp", "-noreset", "-screen", "0"]);
@@ -146,7 +146,7 @@ impl Screen {
         Some(Self { server, name, connection, root, size: [width, height], program: None, errors: None, pictures })
     }
 
-    /// Runs a program on it, with a home of its own.
+    /// Runs a program on the screen, with a home folder of its own.
     pub(crate) fn run(&mut self, mut command: Command, home: &Path) {
         std::fs::create_dir_all(home).expect("a home can be made");
         let errors = home.join("errors.txt");
@@ -155,9 +155,9 @@ impl Screen {
         for name in ["HOME", "XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_CACHE_HOME", "XDG_RUNTIME_DIR"] {
             command.env(name, home);
         }
-        // Nobody who answers for dialogs is asked.
+        // Without a session bus, no portal answers requests for dialogs.
         command.env_remove("DBUS_SESSION_BUS_ADDRESS");
-        // The GPU of the machine may not know this screen; the processor does.
+        // The machine's GPU may not support this screen; the software renderer does.
         let software = "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json";
         if Path::new(software).is_file() {
             command.env("VK_DRIVER_FILES", software).env("VK_ICD_FILENAMES", software);
@@ -168,7 +168,7 @@ impl Screen {
         self.focus();
     }
 
-    /// Gives the program's window the keyboard, as there is nobody else who would.
+    /// Gives the keyboard to the program's window, since the screen has no window manager.
     fn focus(&mut self) {
         let start = Instant::now();
         let window = loop {
@@ -200,7 +200,7 @@ impl Screen {
         }
     }
 
-    /// What the program said.
+    /// The program's standard error.
     pub(crate) fn words(&self) -> String {
         let mut words = String::new();
         if let Some(mut file) = self.errors.as_ref().and_then(|path| std::fs::File::open(path).ok()) {
@@ -209,7 +209,7 @@ impl Screen {
         words
     }
 
-    /// Waits until the program has ended; gives its exit code.
+    /// Waits until the program ends and returns its exit code.
     pub(crate) fn finish(&mut self) -> Option<i32> {
         let start = Instant::now();
         let program = self.program.as_mut().expect("a program runs");
@@ -222,7 +222,7 @@ impl Screen {
         panic!("the program still runs after {WAIT:?}");
     }
 
-    /// What is on the screen now.
+    /// Takes a screenshot.
     fn look(&self) -> Picture {
         let [width, height] = self.size;
         let asked = self.connection.get_image(ImageFormat::Z_PIXMAP, self.root, 0, 0, width, height, u32::MAX);
@@ -231,12 +231,13 @@ impl Screen {
         Picture { width: width.into(), pixels }
     }
 
-    /// Waits until the screen shows what it should and two looks are alike; keeps the picture.
+    /// Waits until the screen shows what `is` accepts and two screenshots are equal. Saves the picture. Panics after
+    /// `WAIT`.
     pub(crate) fn settled(&mut self, name: &str, is: impl Fn(&Picture) -> bool) -> Picture {
         self.wait(name, WAIT, is).unwrap_or_else(|| panic!("step '{name}' is not seen after {WAIT:?}"))
     }
 
-    /// The same, if it comes about in time.
+    /// Like [`settled`](Self::settled), but returns `None` after `time`.
     pub(crate) fn wait(&mut self, name: &str, time: Duration, is: impl Fn(&Picture) -> bool) -> Option<Picture> {
         let start = Instant::now();
         let mut last = self.look();
@@ -253,7 +254,8 @@ impl Screen {
         }
     }
 
-    /// XTEST's FakeInput, by hand: x11rb knows it only with a feature that the window's x11rb is built without.
+    /// Sends XTEST's FakeInput. The request is encoded here because the window's x11rb is built without the feature for
+    /// it.
     fn fake(&self, kind: u8, detail: u8, [x, y]: [i16; 2]) {
         let extension = self.connection.extension_information("XTEST").expect("asked").expect("the screen has XTEST");
         let mut request = [0_u8; 36];
@@ -264,7 +266,7 @@ impl Screen {
         request[26..28].copy_from_slice(&y.to_ne_bytes());
         let sent = self.connection.send_request_without_reply(&[IoSlice::new(&request)], Vec::new());
         sent.expect("sent").check().expect("the screen takes it");
-        // Things that happen in one frame can pass for one.
+        // Events within one frame could merge into one.
         std::thread::sleep(Duration::from_millis(60));
     }
 
@@ -311,7 +313,7 @@ impl Screen {
         self.fake(3, held, [0, 0]);
     }
 
-    /// The text on the clipboard, if it comes in time.
+    /// Text on the clipboard; `None` if none arrives in time.
     pub(crate) fn clipboard(&self) -> Option<String> {
         let atom = |name: &str| {
             let asked = self.connection.intern_atom(false, name.as_bytes()).expect("asked");

@@ -7,20 +7,20 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-/// In the place of ffmpeg: keeps what it is told and the bytes that it is given.
+/// Substitute for ffmpeg: a script that stores its arguments and its input.
 #[cfg(unix)]
 pub(crate) const KEEP: &str = "echo \"$@\" > words; for last; do :; done; cat > \"$last\"";
 
-/// Points on the unit sphere, evenly.
+/// Number of evenly spread points on the unit sphere.
 pub(crate) const SPHERE_POINTS: usize = 6000;
 
-/// A camera in front of the unit sphere.
+/// Camera in front of the unit sphere.
 pub(crate) const FRONT: [&str; 8] = ["--eye", "0,-4,0", "--look-at", "0,0,0", "--up", "0,0,1", "--fov", "40"];
 
-/// An empty folder that vanishes with the test, and the command run in it.
+/// A temporary folder, initially empty, in which the command runs.
 pub(crate) struct Folder(tempfile::TempDir);
 
-/// What the command left behind.
+/// Exit code and output of a run.
 #[derive(Debug)]
 pub(crate) struct Outcome {
     pub(crate) code: Option<i32>,
@@ -33,7 +33,7 @@ impl Folder {
         Self(tempfile::tempdir().expect("a temporary folder can be made"))
     }
 
-    /// A folder with `sphere.ply` in it: coloured, with an intensity that grows with x.
+    /// A folder with `sphere.ply`: coloured, with an intensity that grows with x.
     pub(crate) fn with_sphere() -> Self {
         let folder = Self::new();
         folder.write("sphere.ply", &sphere_ply());
@@ -52,7 +52,7 @@ impl Folder {
         fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// The names of everything in it, in order.
+    /// Names of all entries, in order.
     pub(crate) fn list(&self) -> Vec<String> {
         let entries = fs::read_dir(self.0.path()).expect("the temporary folder can be read");
         let mut names: Vec<_> = entries
@@ -65,12 +65,12 @@ impl Folder {
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_autosplats"));
         command.current_dir(self.0.path()).args(arguments).stdin(Stdio::null());
-        // No test opens a window by mistake.
+        // Prevents tests from opening a window by mistake.
         command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
         command
     }
 
-    /// Puts a shell script into the place of ffmpeg; returns the `PATH` by which it is found.
+    /// Installs a shell script as ffmpeg. Returns the `PATH` that finds it.
     #[cfg(unix)]
     pub(crate) fn with_ffmpeg(&self, script: &str) -> String {
         use std::os::unix::fs::PermissionsExt as _;
@@ -89,14 +89,15 @@ impl Folder {
         }
     }
 
-    /// Runs what has to succeed.
+    /// Runs the command, which must succeed.
     pub(crate) fn succeed(&self, arguments: &[&str]) -> Outcome {
         let outcome = self.run(arguments);
         assert_eq!(outcome.code, Some(0), "{arguments:?}: {}", outcome.stderr);
         outcome
     }
 
-    /// Runs what has to fail: with this code, one line that says all of `words`, and no file more than before.
+    /// Runs the command, which must fail with `code`, print one line that contains all of `words`, and leave no new
+    /// file.
     pub(crate) fn fail(&self, arguments: &[&str], code: i32, words: &[&str]) {
         let before = self.list();
         let Outcome { code: found, stdout, stderr } = self.run(arguments);
@@ -127,7 +128,7 @@ pub(crate) fn sphere_ply() -> String {
     ply(&["float x", "float y", "float z", "uchar red", "uchar green", "uchar blue", "float intensity"], points)
 }
 
-/// An ASCII PLY file with one row for each point.
+/// An ASCII PLY file with one row per point.
 pub(crate) fn ply(properties: &[&str], rows: impl Iterator<Item = String>) -> String {
     let rows: Vec<_> = rows.collect();
     let mut text = format!("ply\nformat ascii 1.0\nelement vertex {}\n", rows.len());
@@ -142,7 +143,7 @@ pub(crate) fn points_ply(points: &[&str]) -> String {
     ply(&["float x", "float y", "float z"], points.iter().map(|point| (*point).to_owned()))
 }
 
-/// Where the real scans are, if they are.
+/// Folder of real scans, if present. Required in CI.
 pub(crate) fn data() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let folder = std::env::var_os("AUTOSPLATS_DATA").map_or(beside, PathBuf::from);
