@@ -33,7 +33,6 @@ Exit codes:
 /// Why a command failed.
 #[derive(Debug)]
 pub(crate) struct Failure {
-    /// Kind, and thus exit code.
     pub(crate) exit: Exit,
     /// What is wrong and what to do, in one line.
     pub(crate) message: String,
@@ -45,12 +44,10 @@ impl Failure {
         Self { exit, message: plain(message.to_string()) }
     }
 
-    /// A failure of bad usage.
     pub(crate) fn usage(message: impl Display) -> Self {
         Self::new(Exit::Usage, message)
     }
 
-    /// A failure because of Ctrl-C.
     pub(crate) fn interrupted() -> Self {
         Self::new(Exit::Interrupted, "interrupted")
     }

@@ -75,7 +75,6 @@ struct Input {
     pose: Option<PathBuf>,
 }
 
-/// An input that is played.
 pub(crate) struct Playing {
     pub(crate) name: String,
     pub(crate) player: Player,
@@ -156,7 +155,6 @@ impl Inputs {
         list.into_iter().map(input).collect()
     }
 
-    /// The first input.
     pub(crate) fn only(&self) -> &Source {
         &self.list[0].source
     }

@@ -112,7 +112,6 @@ pub(crate) fn duration(text: &str) -> Result<Duration, String> {
     seconds.map(Duration::from_secs_f64).ok_or("must be a time such as 2s, 500ms or 1min".into())
 }
 
-/// Parses a number of frames.
 pub(crate) fn frames(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(frames) if (1..=100_000).contains(&frames) => Ok(frames),
@@ -259,7 +258,6 @@ pub(crate) fn color(text: &str) -> Result<ColorMode, String> {
     })
 }
 
-/// Parses a finite number.
 fn number<T: FromStr + Into<f64> + Copy>(text: &str) -> Option<T> {
     text.trim().parse::<T>().ok().filter(|&value| value.into().is_finite())
 }

@@ -63,7 +63,6 @@ impl Examiner {
         Self { options, scan, quiet, large: Mutex::new(()) }
     }
 
-    /// Examines one input.
     pub(super) fn examine(&self, name: &str) -> Examination {
         let mut report = Report { input: name.into(), ..Report::default() };
         let outcome = Inputs::new(&[name.into()], &InputArgs::default()).and_then(|inputs| {
@@ -166,7 +165,6 @@ impl Report {
         }
     }
 
-    /// Adds the header's facts.
     fn describe(&mut self, header: &Description) {
         let Description { format, points, faces, bounds, attributes, crs, scans, resolution, details, notes } = header;
         self.format = Some(format.clone());

@@ -82,7 +82,6 @@ impl Bounds {
     }
 }
 
-/// The up axis.
 #[derive(Debug, Serialize)]
 pub(super) struct AxesFound {
     pub(super) name: &'static str,

@@ -21,11 +21,8 @@ const BLOCK: usize = 1 << 16;
 /// Source of the values.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Values<'a> {
-    /// Coordinates along an axis.
     Axis(&'a PointCloud, usize),
-    /// A channel of the colours.
     Channel(&'a [[u8; 3]], usize),
-    /// A scalar field.
     Field(&'a FieldValues),
 }
 

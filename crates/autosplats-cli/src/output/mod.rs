@@ -154,7 +154,6 @@ fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
     Failure::new(Exit::Output, format!("{}: cannot be written: {reason}", path.display()))
 }
 
-/// Folder of a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -168,14 +167,12 @@ fn temporary_in(folder: &Path) -> std::io::Result<NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// A picture to write.
 #[derive(Clone, Debug)]
 pub(crate) struct Picture {
     pub(crate) path: PathBuf,
     pub(crate) format: Format,
 }
 
-/// File format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     Png,

@@ -270,7 +270,6 @@ impl Screen {
         std::thread::sleep(Duration::from_millis(60));
     }
 
-    /// Moves the mouse.
     pub(crate) fn point(&self, place: [i16; 2]) {
         self.fake(6, 0, place);
     }
@@ -299,7 +298,6 @@ impl Screen {
         codes.find(|(symbols, _)| symbols[0] == symbol).unwrap_or_else(|| panic!("no key for {symbol:x}")).1
     }
 
-    /// Presses a key.
     pub(crate) fn key(&self, symbol: u32) {
         let code = self.code(symbol);
         [2, 3].into_iter().for_each(|kind| self.fake(kind, code, [0, 0]));

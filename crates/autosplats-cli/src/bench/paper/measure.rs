@@ -70,7 +70,6 @@ pub(super) type Outcome<T> = Result<T, String>;
 /// Medians of several frames, in milliseconds.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Timing {
-    /// Points of the cloud.
     pub(super) points: usize,
     pub(super) visible: usize,
     /// Reconstructed points among the visible ones.

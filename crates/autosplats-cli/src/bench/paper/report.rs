@@ -27,7 +27,6 @@ pub(super) struct Report<'a> {
     pub(super) scales: &'a str,
     /// Name of the folder with pictures and charts, beside the page.
     pub(super) folder: &'a str,
-    /// Whether scenes are small.
     pub(super) quick: bool,
 }
 
