@@ -135,7 +135,7 @@ fn windows_need_a_screen() {
         folder.fail(words, 5, &["no window can be opened", "DISPLAY", "autosplats render"]);
     }
     folder.write("session.json", "{\"inputs\": 3}");
-    folder.fail(&["--state", "session.json"], 3, &["session.json", "no saved state"]);
+    folder.fail(&["--state", "session.json"], 3, &["session.json", "not a session file"]);
 }
 
 #[test]

@@ -254,7 +254,7 @@ fn is_build(time: &PassTime) -> bool {
     time.pass.starts_with(BUILD)
 }
 
-/// Exact k-radii among the visible points and among all points of a cloud.
+/// True k-radii among the visible points and among all points of a cloud.
 #[derive(Debug)]
 pub(super) struct Exact {
     on_screen: Vec<f32>,
