@@ -4,7 +4,7 @@ use std::fs::read_to_string;
 use std::io::{IsTerminal as _, stderr, stdout};
 use std::time::Instant;
 
-use autosplats::{AdapterSummary, Backend as Wanted, Frame, Renderer, Settings, adapters};
+use autosplats::{AdapterSummary, Backend as BackendChoice, Frame, Renderer, Settings, adapters};
 use autosplats_cloud::{Scene, available_memory, formats, read, write, written_formats};
 use pulp::{Arch, Simd, WithSimd};
 use serde::Serialize;
@@ -20,7 +20,7 @@ use crate::render::scene_camera;
 const BYTES_PER_POINT: u64 = 12 + 3;
 
 /// Peak memory of the program over that of the points, while it reads a file and renders it.
-const PEAK: f64 = 2.3;
+const PEAK_MEMORY_RATIO: f64 = 2.3;
 
 /// Points and pixels of the self-test.
 const TEST_POINTS: usize = 20_000;
@@ -143,7 +143,8 @@ impl Findings {
             memory: Memory {
                 total: total_memory(),
                 available,
-                largest_cloud: available.map(|bytes| (bytes as f64 / (BYTES_PER_POINT as f64 * PEAK)) as u64),
+                largest_cloud: available
+                    .map(|bytes| (bytes as f64 / (BYTES_PER_POINT as f64 * PEAK_MEMORY_RATIO)) as u64),
             },
             self_test,
             terminal: Terminal {
@@ -267,7 +268,7 @@ impl SelfTest {
         };
         self.render_ms = render(&mut cpu)?;
         if !adapters().is_empty() {
-            let mut gpu = Renderer::with_backend(Wanted::Gpu).map_err(|error| said(&error))?;
+            let mut gpu = Renderer::with_backend(BackendChoice::Gpu).map_err(|error| said(&error))?;
             let took = render(&mut gpu).map_err(|error| format!("on the GPU: {error}"))?;
             let unlike = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > 2);
             let unlike = pictures[0].iter().zip(&pictures[1]).filter(unlike).count();

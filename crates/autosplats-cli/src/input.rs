@@ -15,18 +15,18 @@ use rayon::prelude::*;
 use crate::args::{InputArgs, PlayingArgs, ReadingArgs};
 use crate::exit::{Exit, Failure, suggest};
 use crate::output::{ReadFiles, folder_of};
-use crate::progress::{Bar, Part};
+use crate::progress::{Bar, InputProgress};
 
 /// Prefix of a generated scene's name.
 const SCENE_PREFIX: &str = "scene:";
 
 /// Longest time to wait for the first points of a live input.
-pub(crate) const FIRST_POINTS: Duration = Duration::from_secs(30);
+pub(crate) const FIRST_POINTS_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Most fields and inputs that a message names.
-const LISTED: usize = 10;
+const MAX_LISTED_NAMES: usize = 10;
 /// Gap between two inputs, in sizes of the larger one, above which a picture of both shows each as a few pixels.
-const FAR_APART: f64 = 200.0;
+const MAX_GAP_SIZES: f64 = 200.0;
 
 /// The inputs of one command. All files exist.
 #[derive(Debug)]
@@ -167,7 +167,7 @@ impl Inputs {
 
     /// The names as typed, for messages.
     pub(crate) fn names(&self) -> String {
-        let names: Vec<&str> = self.list.iter().take(LISTED).map(|input| &*input.name).collect();
+        let names: Vec<&str> = self.list.iter().take(MAX_LISTED_NAMES).map(|input| &*input.name).collect();
         let more = self.list.len() - names.len();
         names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
     }
@@ -196,7 +196,7 @@ impl Inputs {
             if frames > 1 {
                 progress.note(&format!("this is the first of {frames} frames"));
             }
-            player.first(FIRST_POINTS, progress).map(Arc::unwrap_or_clone)
+            player.first(FIRST_POINTS_TIMEOUT, progress).map(Arc::unwrap_or_clone)
         })
     }
 
@@ -309,8 +309,8 @@ impl Inputs {
         // Of several failures, the first input's is reported, independent of timing.
         let clouds: Vec<Result<_, Failure>> = clouds.collect();
         let clouds = clouds.into_iter().collect::<Result<Vec<_>, _>>()?;
-        tell_disagreements(&clouds, &parts);
-        tell_far_apart(&clouds, &parts);
+        note_differences(&clouds, &parts);
+        note_distant_inputs(&clouds, &parts);
         Ok(PointCloud::merge(clouds))
     }
 }
@@ -330,15 +330,19 @@ fn posed<'a>(names: &[String], pose: &'a str) -> Option<(usize, &'a Path)> {
 }
 
 /// Notes the fields and coordinate systems that the merged cloud loses because the inputs differ in them.
-fn tell_disagreements(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
+fn note_differences(clouds: &[(PointCloud, DMat4)], parts: &[InputProgress<'_>]) {
     let [(first, _), others @ ..] = clouds else { return };
     for ((cloud, _), part) in clouds.iter().zip(parts) {
         let has = |(other, _): &(PointCloud, DMat4), name: &str| other.fields().iter().any(|field| field.name == name);
         let lost = cloud.fields().iter().filter(|field| !clouds.iter().all(|other| has(other, &field.name)));
         let lost: Vec<String> = lost.map(|field| field.name.escape_debug().take(40).collect()).collect();
         if !lost.is_empty() {
-            let more = if lost.len() > LISTED { format!(" and {} more", lost.len() - LISTED) } else { String::new() };
-            let names = lost[..lost.len().min(LISTED)].join(", ");
+            let more = if lost.len() > MAX_LISTED_NAMES {
+                format!(" and {} more", lost.len() - MAX_LISTED_NAMES)
+            } else {
+                String::new()
+            };
+            let names = lost[..lost.len().min(MAX_LISTED_NAMES)].join(", ");
             part.note(&format!("not all inputs have {names}{more}; left out"));
         }
     }
@@ -351,7 +355,7 @@ fn tell_disagreements(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
 }
 
 /// Notes the inputs that lie too far from all others to be seen in one picture.
-fn tell_far_apart(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
+fn note_distant_inputs(clouds: &[(PointCloud, DMat4)], parts: &[InputProgress<'_>]) {
     if clouds.len() < 2 {
         return;
     }
@@ -367,7 +371,7 @@ fn tell_far_apart(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
         others.map(|(_, &other)| apart(boxes[at], other)).fold(f64::INFINITY, f64::min)
     };
     let mut far: Vec<_> =
-        (0..boxes.len()).map(|at| (at, nearest(at))).filter(|&(_, apart)| apart > FAR_APART).collect();
+        (0..boxes.len()).map(|at| (at, nearest(at))).filter(|&(_, apart)| apart > MAX_GAP_SIZES).collect();
     // If every input is far from all others, the first is the reference.
     if far.len() == boxes.len() {
         far.remove(0);

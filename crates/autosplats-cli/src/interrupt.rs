@@ -6,18 +6,18 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::exit::Exit;
 
-static REQUESTED: AtomicBool = AtomicBool::new(false);
-static GENTLY: AtomicBool = AtomicBool::new(false);
-static ENDING: AtomicBool = AtomicBool::new(false);
-static WRITING: Mutex<()> = Mutex::new(());
+static END_NOW: AtomicBool = AtomicBool::new(false);
+static FINISH_FIRST: AtomicBool = AtomicBool::new(false);
+static FINISHING: AtomicBool = AtomicBool::new(false);
+static WRITE_LOCK: Mutex<()> = Mutex::new(());
 
 /// Installs the handler. Where none can be installed, as in some containers, the system's default ends the program.
 pub(crate) fn install() {
     let _ = ctrlc::set_handler(|| {
-        if GENTLY.load(Ordering::SeqCst) && !ENDING.swap(true, Ordering::SeqCst) {
+        if FINISH_FIRST.load(Ordering::SeqCst) && !FINISHING.swap(true, Ordering::SeqCst) {
             return;
         }
-        REQUESTED.store(true, Ordering::SeqCst);
+        END_NOW.store(true, Ordering::SeqCst);
         // The writing thread sees the request, removes its temporary file and releases the lock; nothing is left
         // behind.
         let _nothing_is_being_written = writing();
@@ -29,20 +29,20 @@ pub(crate) fn install() {
 
 /// Makes the next Ctrl-C only ask the work to [finish](ending). The one after ends the program.
 pub(crate) fn end_gently() {
-    GENTLY.store(true, Ordering::SeqCst);
+    FINISH_FIRST.store(true, Ordering::SeqCst);
 }
 
 /// Whether the work has been asked to finish.
 pub(crate) fn ending() -> bool {
-    ENDING.load(Ordering::SeqCst)
+    FINISHING.load(Ordering::SeqCst)
 }
 
 /// Whether the program has been asked to end at once.
 pub(crate) fn requested() -> bool {
-    REQUESTED.load(Ordering::SeqCst)
+    END_NOW.load(Ordering::SeqCst)
 }
 
 /// Lock that is held while a temporary file exists.
 pub(crate) fn writing() -> MutexGuard<'static, ()> {
-    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
+    WRITE_LOCK.lock().unwrap_or_else(PoisonError::into_inner)
 }

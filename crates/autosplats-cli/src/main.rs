@@ -35,7 +35,7 @@ use crate::args::{Command, CommandLine};
 use crate::exit::{Exit, Failure, suggest};
 
 fn main() -> ExitCode {
-    hush_drivers();
+    silence_drivers();
     interrupt::install();
     let outcome = match CommandLine::try_parse() {
         Ok(command_line) => run(command_line),
@@ -59,7 +59,7 @@ fn main() -> ExitCode {
 /// Keeps Mesa's device selection from printing to standard error, where the command's own messages go. Without a
 /// session, Mesa cannot ask Wayland for the screen's device and reports that. A choice that the user made stays.
 #[allow(unsafe_code, reason = "the environment can be changed in no other way")]
-fn hush_drivers() {
+fn silence_drivers() {
     const CHOICE: &str = "NODEVICE_SELECT";
     if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() && std::env::var_os(CHOICE).is_none()
     {

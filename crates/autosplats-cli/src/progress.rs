@@ -13,12 +13,12 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::interrupt;
 
-const PATIENCE: Duration = Duration::from_millis(500);
-const REDRAW: Duration = Duration::from_millis(100);
-const STEPS: u64 = 1000;
+const SHOW_AFTER: Duration = Duration::from_millis(500);
+const REDRAW_INTERVAL: Duration = Duration::from_millis(100);
+const PROGRESS_STEPS: u64 = 1000;
 
 /// Most notes on one input that plays. A stream of malformed data has no end.
-const MOST_NOTES: u64 = 50;
+const MAX_NOTES: u64 = 50;
 
 /// A progress bar on the terminal. It disappears when dropped.
 pub(crate) struct Bar {
@@ -60,8 +60,8 @@ impl Bar {
     }
 
     /// Returns one of `parts` equal parts of this task, which reports on an input.
-    pub(crate) fn part(&self, parts: usize, subject: &str) -> Part<'_> {
-        Part { bar: self, parts, subject: subject.into(), done: AtomicU64::new(0), notes: Mutex::default() }
+    pub(crate) fn part(&self, parts: usize, subject: &str) -> InputProgress<'_> {
+        InputProgress { bar: self, parts, subject: subject.into(), done: AtomicU64::new(0), notes: Mutex::default() }
     }
 
     /// Starts a task of unknown progress.
@@ -70,8 +70,8 @@ impl Bar {
     }
 
     fn start(task: &str, quiet: bool, template: &str, characters: &str) -> Self {
-        let bar =
-            ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden()).with_message(task.to_owned());
+        let bar = ProgressBar::with_draw_target(Some(PROGRESS_STEPS), ProgressDrawTarget::hidden())
+            .with_message(task.to_owned());
         if quiet || !stderr().is_terminal() {
             return Self { bar, subject: String::new(), quiet, done: None, drawing: None };
         }
@@ -82,11 +82,11 @@ impl Bar {
         let (done, ended) = channel::<()>();
         let shown = bar.clone();
         let drawing = std::thread::spawn(move || {
-            let mut wait = PATIENCE;
+            let mut wait = SHOW_AFTER;
             while ended.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
-                if wait == PATIENCE {
+                if wait == SHOW_AFTER {
                     shown.set_draw_target(ProgressDrawTarget::stderr());
-                    wait = REDRAW;
+                    wait = REDRAW_INTERVAL;
                 }
                 shown.tick();
             }
@@ -98,7 +98,7 @@ impl Bar {
 
 impl Progress for Bar {
     fn report(&self, fraction: f32) {
-        self.bar.set_position((fraction.clamp(0.0, 1.0) * STEPS as f32) as u64);
+        self.bar.set_position((fraction.clamp(0.0, 1.0) * PROGRESS_STEPS as f32) as u64);
     }
 
     fn cancelled(&self) -> bool {
@@ -118,7 +118,7 @@ pub(crate) struct Notes<'a> {
 }
 
 impl<'a> Notes<'a> {
-    /// Creates the notes on `input`. Only the first `MOST_NOTES` are printed.
+    /// Creates the notes on `input`. Only the first `MAX_NOTES` are printed.
     pub(crate) fn new(bar: &'a Bar, input: &str) -> Self {
         Self { bar, subject: input.into(), told: AtomicU64::new(0) }
     }
@@ -126,8 +126,8 @@ impl<'a> Notes<'a> {
     /// Prints a note.
     pub(crate) fn tell(&self, note: &str) {
         match self.told.fetch_add(1, Ordering::Relaxed) {
-            told if told < MOST_NOTES => self.bar.tell(&self.subject, note),
-            MOST_NOTES => self.bar.tell(&self.subject, "further notes on this input are omitted"),
+            told if told < MAX_NOTES => self.bar.tell(&self.subject, note),
+            MAX_NOTES => self.bar.tell(&self.subject, "further notes on this input are omitted"),
             _ => {}
         }
     }
@@ -146,7 +146,7 @@ impl Progress for Notes<'_> {
 }
 
 /// Progress of one of several parallel parts of a task, on one bar.
-pub(crate) struct Part<'a> {
+pub(crate) struct InputProgress<'a> {
     bar: &'a Bar,
     parts: usize,
     subject: String,
@@ -156,9 +156,9 @@ pub(crate) struct Part<'a> {
     notes: Mutex<Vec<String>>,
 }
 
-impl Progress for Part<'_> {
+impl Progress for InputProgress<'_> {
     fn report(&self, fraction: f32) {
-        let done = (fraction.clamp(0.0, 1.0) * STEPS as f32) as u64 / self.parts as u64;
+        let done = (fraction.clamp(0.0, 1.0) * PROGRESS_STEPS as f32) as u64 / self.parts as u64;
         let before = self.done.fetch_max(done, Ordering::Relaxed);
         self.bar.bar.inc(done.saturating_sub(before));
     }
@@ -172,7 +172,7 @@ impl Progress for Part<'_> {
     }
 }
 
-impl Drop for Part<'_> {
+impl Drop for InputProgress<'_> {
     fn drop(&mut self) {
         for note in self.notes.lock().unwrap_or_else(PoisonError::into_inner).iter() {
             self.bar.tell(&self.subject, note);

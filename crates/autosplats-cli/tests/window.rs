@@ -15,7 +15,7 @@ use std::time::Duration;
 use screen::{Picture, Screen, keys};
 
 /// Largest difference of equal pictures, of 1: half a level.
-const SAME: f64 = 0.002;
+const MAX_DIFFERENCE: f64 = 0.002;
 
 /// Input of the session: the bunny if the data is present, else a sphere.
 fn input(folder: &common::Folder) -> PathBuf {
@@ -59,8 +59,9 @@ fn a_session_in_a_window() {
     let rough = |picture: &Picture| picture.crop([x - 100, y - 100, x + 100, y + 100]).roughness();
     assert!(rough(&dots) > 2.0 * rough(&turned), "dots are rough: {} {}", rough(&dots), rough(&turned));
     screen.key(keys::TAB);
-    let back = screen.settled("4-surface", |picture| picture.crop(view).difference(&turned.crop(view)) < SAME);
-    assert!(back.crop(view).difference(&dots.crop(view)) > SAME, "the comparison can tell");
+    let back =
+        screen.settled("4-surface", |picture| picture.crop(view).difference(&turned.crop(view)) < MAX_DIFFERENCE);
+    assert!(back.crop(view).difference(&dots.crop(view)) > MAX_DIFFERENCE, "the comparison can tell");
 
     screen.key(keys::X);
     screen.click(middle);
@@ -97,8 +98,9 @@ fn a_session_in_a_window() {
     screen.key(keys::ESCAPE);
     screen.key(keys::ESCAPE);
     let rest = [left, top, right, bottom - 130];
-    let undone = screen.settled("10-undone", |picture| picture.crop(rest).difference(&back.crop(rest)) < SAME);
-    assert!(undone.crop(rest).difference(&deleted.crop(rest)) > SAME, "the comparison can tell");
+    let undone =
+        screen.settled("10-undone", |picture| picture.crop(rest).difference(&back.crop(rest)) < MAX_DIFFERENCE);
+    assert!(undone.crop(rest).difference(&deleted.crop(rest)) > MAX_DIFFERENCE, "the comparison can tell");
 
     screen.keys_with(keys::CTRL, keys::C);
     let copied = screen.clipboard().expect("a view is on the clipboard");
@@ -120,7 +122,11 @@ fn a_session_in_a_window() {
     let [seen, rendered] = ["picture.png", "rendered.png"].map(|name| Picture::read(&folder.path(name)));
     // Both cameras are bit-identical; the pictures differ only in default settings.
     assert!(seen.spread() > 20.0, "something is seen");
-    assert!(seen.difference(&rendered) < SAME, "render makes the same picture: {}", seen.difference(&rendered));
+    assert!(
+        seen.difference(&rendered) < MAX_DIFFERENCE,
+        "render makes the same picture: {}",
+        seen.difference(&rendered)
+    );
 }
 
 /// An empty screen has one colour.

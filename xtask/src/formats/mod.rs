@@ -15,44 +15,65 @@ use serde_json::Value;
 
 use crate::{FEATURES, cargo_command};
 
-use self::outcome::{Outcome, Row};
-use self::words::{FILES, HEAD, WORDS};
+use self::outcome::{FileOutcome, FileRow};
+use self::words::{FILES_TEXT, FORMAT_TEXTS, HEAD_TEXT};
+
+/// The document, from the repository's root.
+const DOCUMENT: &str = "docs/FORMATS.md";
 
 /// Files that accompany point files, with what they are.
-const COMPANIONS: [(&str, &str); 4] = [
+const COMPANION_FILES: [(&str, &str); 4] = [
     ("README.md", "documentation"),
     (".conf", "poses of scans"),
     ("pose.txt", "poses of pictures"),
     ("color_", "colour picture"),
 ];
 
-/// Writes the document. With `check`, only compares it with the existing one.
-pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
-    let program = build(root)?;
-    let data = std::env::var_os("AUTOSPLATS_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
-    let data = data.canonicalize().with_context(|| format!("{}: the test data is needed", data.display()))?;
-
-    let mut document = HEAD.to_owned();
-    formats(&program, &mut document)?;
-    schema(&program, &mut document)?;
-    files(&program, &data, &mut document)?;
-
-    let target = root.join("docs/FORMATS.md");
-    if check {
-        let there = read_to_string(&target).unwrap_or_default();
-        ensure!(there == document, "docs/FORMATS.md is not up to date; write it with cargo xtask formats");
-        println!("docs/FORMATS.md is up to date");
-        return Ok(());
-    }
-    std::fs::write(&target, document).with_context(|| target.display().to_string())?;
+/// Writes the document.
+pub(crate) fn write(root: &Path, program: &Path) -> Result<()> {
+    let target = root.join(DOCUMENT);
+    std::fs::write(&target, document(root, program)?).with_context(|| target.display().to_string())?;
     println!("{}", target.display());
     Ok(())
 }
 
-/// Builds the command and returns its path.
-fn build(root: &Path) -> Result<PathBuf> {
-    let mut command = Command::new("cargo");
-    command.current_dir(root).args(["build", "--package", "autosplats-cli", "--message-format", "json"]);
+/// Checks that the document is what this build writes. Where there is no data this says that nothing is checked; where
+/// `CI` is set it fails.
+pub(crate) fn check(root: &Path, program: &Path) -> Result<()> {
+    if data(root).is_err() && std::env::var_os("CI").is_none() {
+        println!("the test data are absent: {DOCUMENT} is not checked");
+        return Ok(());
+    }
+    let there = read_to_string(root.join(DOCUMENT)).unwrap_or_default();
+    let document = document(root, program)?;
+    let differing = there.lines().zip(document.lines()).find(|(there, new)| there != new);
+    if let Some((there, new)) = differing {
+        println!("there: {there}\nmade:  {new}");
+    }
+    ensure!(there == document, "{DOCUMENT} is not what this build makes; cargo xtask formats writes it");
+    println!("{DOCUMENT} is up to date");
+    Ok(())
+}
+
+fn data(root: &Path) -> Result<PathBuf> {
+    let data = std::env::var_os("AUTOSPLATS_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
+    data.canonicalize().with_context(|| format!("{}: the test data are needed", data.display()))
+}
+
+fn document(root: &Path, program: &Path) -> Result<String> {
+    let mut document = HEAD_TEXT.to_owned();
+    formats(program, &mut document)?;
+    schema(program, &mut document)?;
+    files(program, &data(root)?, &mut document)?;
+    Ok(document)
+}
+
+/// Builds the command as the tests have it, and returns where it is.
+pub(crate) fn build(root: &Path) -> Result<PathBuf> {
+    let mut command = cargo_command(root);
+    command
+        .args(["build", "--locked", "--workspace", "--bin", "autosplats", "--message-format", "json"])
+        .args(FEATURES);
     let output = command.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
     ensure!(output.status.success(), "cargo build: {}", output.status);
     let messages = String::from_utf8(output.stdout)?;
@@ -60,7 +81,7 @@ fn build(root: &Path) -> Result<PathBuf> {
         let message: Value = serde_json::from_str(line).ok()?;
         Some(PathBuf::from(message["executable"].as_str()?))
     });
-    programs.next_back().context("cargo built no program")
+    programs.next_back().context("cargo builds no program")
 }
 
 /// Writes the tables of formats, read and written.
@@ -71,7 +92,7 @@ fn formats(program: &Path, document: &mut String) -> Result<()> {
     let list = |which: &str| found["formats"][which].as_array().cloned().unwrap_or_default();
     for format in list("read") {
         let (name, extensions) = name_and_extensions(&format);
-        let Some(words) = WORDS.iter().find(|words| words.name == name) else {
+        let Some(words) = FORMAT_TEXTS.iter().find(|words| words.name == name) else {
             bail!("format {name}: describe it in xtask/src/formats/words.rs");
         };
         let _ = writeln!(document, "| {name} | {extensions} | {} | {} |", words.kept, words.not_kept);
@@ -109,35 +130,37 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
     let mut names = Vec::new();
     collect(data, data, &mut names)?;
     let pictures = tempfile::tempdir()?;
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<FileRow> = Vec::new();
     let mut others: BTreeMap<String, Vec<String>> = BTreeMap::new();
     let total = names.len();
     for (number, name) in names.into_iter().enumerate() {
         println!("{:>4} of {total}  {name}", number + 1);
         let base = name.rsplit('/').next().unwrap_or(&name);
-        if let Some((_, about)) = COMPANIONS.iter().find(|(part, _)| base.starts_with(part) || base.ends_with(part)) {
+        if let Some((_, about)) =
+            COMPANION_FILES.iter().find(|(part, _)| base.starts_with(part) || base.ends_with(part))
+        {
             others.entry((*about).to_owned()).or_default().push(name);
             continue;
         }
-        let outcome = Outcome::of(program, data, &name, &pictures.path().join("picture.png"))?;
+        let outcome = FileOutcome::of(program, data, &name, &pictures.path().join("picture.png"))?;
         if name.ends_with(".mcap") && !name.contains("lfs") {
             others.entry("recordings (played)".into()).or_default().push(name);
             continue;
         }
         match rows.last_mut().filter(|row| row.continues(&name, &outcome)) {
             Some(row) => row.add(&name, &outcome),
-            None => rows.push(Row::new(name, outcome)),
+            None => rows.push(FileRow::new(name, outcome)),
         }
     }
     document.push('\n');
-    document.push_str(FILES);
+    document.push_str(FILES_TEXT);
     document
         .push_str("\n| file | format | points | attributes | bounds | unit, system | sensors | notes | rendered |\n");
     document.push_str("|---|---|---|---|---|---|---|---|---|\n");
     rows.iter().for_each(|row| document.push_str(&row.to_markdown()));
-    let points: usize = rows.iter().map(Row::files).sum();
-    let read: usize = rows.iter().filter(|row| row.is_read()).map(Row::files).sum();
-    let rendered: usize = rows.iter().filter(|row| row.is_rendered()).map(Row::files).sum();
+    let points: usize = rows.iter().map(FileRow::files).sum();
+    let read: usize = rows.iter().filter(|row| row.is_read()).map(FileRow::files).sum();
+    let rendered: usize = rows.iter().filter(|row| row.is_rendered()).map(FileRow::files).sum();
     let _ = writeln!(
         document,
         "\nOf {points} point files, {read} are read and {rendered} are rendered.\n\nFiles without points:\n"

@@ -10,24 +10,24 @@ use anyhow::{Context as _, Result};
 use serde_json::Value;
 
 /// Time limit of a command.
-const LIMIT: Duration = Duration::from_secs(120);
+const COMMAND_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Results of `info` and `render` for a file.
-pub(super) struct Outcome {
+pub(super) struct FileOutcome {
     report: Value,
     /// Why there is no report, or no picture.
     error: Option<String>,
     rendered: bool,
 }
 
-impl Outcome {
+impl FileOutcome {
     /// Examines and renders a file of `data`.
     pub(super) fn of(program: &Path, data: &Path, name: &str, picture: &Path) -> Result<Self> {
         let info = run(program, data, &["info", "--scan", "--json", "--quiet", name])?;
         let report: Value =
             info.as_ref().map_or(Value::Null, |info| serde_json::from_str(&info.stdout).unwrap_or_default());
         let error = match &info {
-            None => Some(format!("no answer within {} s", LIMIT.as_secs())),
+            None => Some(format!("no answer within {} s", COMMAND_TIMEOUT.as_secs())),
             Some(info) if info.code.is_none() => Some("the program crashed".into()),
             Some(_) => report["error"].as_str().map(str::to_owned),
         };
@@ -35,7 +35,7 @@ impl Outcome {
         let render = run(program, data, &["render", name, "-o", &picture, "--size", "160x120", "--quiet"])?;
         let rendered = render.as_ref().is_some_and(|render| render.code == Some(0));
         let said = render.map_or_else(
-            || format!("no picture within {} s", LIMIT.as_secs()),
+            || format!("no picture within {} s", COMMAND_TIMEOUT.as_secs()),
             |render| render.stderr.lines().last().unwrap_or_default().trim_start_matches("error: ").to_owned(),
         );
         let error = error.or_else(|| (!rendered).then(|| format!("not rendered: {said}")));
@@ -99,29 +99,29 @@ impl Outcome {
 }
 
 /// A row of the table: one file, or several equal ones.
-pub(super) struct Row {
+pub(super) struct FileRow {
     first: String,
     last: String,
     files: usize,
-    outcome: Outcome,
+    outcome: FileOutcome,
     points: Option<[u64; 2]>,
     bounds: Option<[[f64; 3]; 2]>,
 }
 
-impl Row {
-    pub(super) fn new(name: String, outcome: Outcome) -> Self {
+impl FileRow {
+    pub(super) fn new(name: String, outcome: FileOutcome) -> Self {
         let points = outcome.points().map(|points| [points; 2]);
         Self { last: name.clone(), first: name, files: 1, points, bounds: outcome.bounds(), outcome }
     }
 
     /// Whether a file continues the sequence of this row.
-    pub(super) fn continues(&self, name: &str, outcome: &Outcome) -> bool {
+    pub(super) fn continues(&self, name: &str, outcome: &FileOutcome) -> bool {
         let pattern = |name: &str| name.replace(|c: char| c.is_ascii_digit(), "0");
         // Digits number the frames, so names are compared with every digit replaced by 0.
         pattern(name) == pattern(&self.first) && outcome.kind() == self.outcome.kind()
     }
 
-    pub(super) fn add(&mut self, name: &str, outcome: &Outcome) {
+    pub(super) fn add(&mut self, name: &str, outcome: &FileOutcome) {
         self.last = name.into();
         self.files += 1;
         if let (Some(points), Some(all)) = (outcome.points(), &mut self.points) {
@@ -195,7 +195,7 @@ fn seven_digits(value: f64) -> String {
 }
 
 /// Exit code and output of a command.
-struct Ended {
+struct CommandOutput {
     /// `None` if a signal ended the command.
     code: Option<i32>,
     stdout: String,
@@ -203,8 +203,8 @@ struct Ended {
 }
 
 /// Runs the program in the folder of the data, so that messages contain no absolute paths. Returns `None` after
-/// `LIMIT`.
-fn run(program: &Path, data: &Path, arguments: &[&str]) -> Result<Option<Ended>> {
+/// `COMMAND_TIMEOUT`.
+fn run(program: &Path, data: &Path, arguments: &[&str]) -> Result<Option<CommandOutput>> {
     let mut command = Command::new(program);
     command.current_dir(data).args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().context("cannot start the program")?;
@@ -223,7 +223,7 @@ fn run(program: &Path, data: &Path, arguments: &[&str]) -> Result<Option<Ended>>
         if let Some(status) = child.try_wait()? {
             break Some(status);
         }
-        if start.elapsed() > LIMIT {
+        if start.elapsed() > COMMAND_TIMEOUT {
             child.kill()?;
             child.wait()?;
             break None;
@@ -232,24 +232,24 @@ fn run(program: &Path, data: &Path, arguments: &[&str]) -> Result<Option<Ended>>
     };
     let stdout = read_out.join().ok().context("the output cannot be read")??;
     let stderr = read_err.join().ok().context("the output cannot be read")??;
-    Ok(status.map(|status| Ended { code: status.code(), stdout, stderr }))
+    Ok(status.map(|status| CommandOutput { code: status.code(), stdout, stderr }))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn outcome(points: u64, rendered: bool) -> Outcome {
+    fn outcome(points: u64, rendered: bool) -> FileOutcome {
         let report = serde_json::json!({
             "format": "PLY", "points": points, "scanned": true, "error": null, "warnings": [format!("{points} odd | ones")],
             "bounds": {"min": [0.0, -1.5, 0.0], "max": [points as f64, 1.0, 5_403_547.5]},
         });
-        Outcome { report, error: None, rendered }
+        FileOutcome { report, error: None, rendered }
     }
 
     #[test]
     fn equal_files_share_a_row() {
-        let mut row = Row::new("a/frame_001.ply".into(), outcome(10, true));
+        let mut row = FileRow::new("a/frame_001.ply".into(), outcome(10, true));
         assert!(row.continues("a/frame_002.ply", &outcome(12, true)), "only numbers differ");
         assert!(!row.continues("b/frame_002.ply", &outcome(12, true)), "another folder");
         assert!(!row.continues("a/frame_002.ply", &outcome(12, false)), "another outcome");

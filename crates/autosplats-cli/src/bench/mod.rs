@@ -21,10 +21,10 @@ use crate::threads::start_threads;
 use crate::values::Neighbors;
 
 /// Frames before the measured ones, in which buffers are created, caches filled and clocks raised.
-const WARM_UP: usize = 3;
+const WARM_UP_FRAMES: usize = 3;
 
 /// Prefix of the passes that build the kd-tree, as opposed to searching it.
-const BUILD: &str = "search/kd_tree/build/";
+const TREE_BUILD_PREFIX: &str = "search/kd_tree/build/";
 
 /// The object that `--json` prints.
 #[derive(Debug, Serialize)]
@@ -146,7 +146,7 @@ fn measure(
     let (mut counts, mut first_upload_ms) = (Counts::default(), 0.0);
     // A renderer takes clouds of another identity as new points, so two alternating clouds are always new.
     let other = args.stream.then(|| copy(cloud)).transpose()?;
-    for frame in 0..WARM_UP + args.frames {
+    for frame in 0..WARM_UP_FRAMES + args.frames {
         let cloud = other.as_ref().filter(|_| frame % 2 == 1).unwrap_or(cloud);
         let started = Instant::now();
         let rendered = renderer.render(cloud, &camera, args.size, settings).map_err(render_failure)?;
@@ -154,7 +154,7 @@ fn measure(
         if frame == 0 {
             (counts, first_upload_ms) = (rendered.counts, rendered.timings.upload);
         }
-        if frame >= WARM_UP {
+        if frame >= WARM_UP_FRAMES {
             samples.push((picture_ms, rendered.timings, rendered.passes.to_vec()));
         }
     }
@@ -240,7 +240,8 @@ impl Bench<'_> {
                     let repeated = if times > 1 { format!(" x{times}") } else { String::new() };
                     line(&format!("  {}{repeated}", &pass[prefix.len()..]), ms);
                 }
-                let build: f64 = passes.iter().filter(|time| time.pass.starts_with(BUILD)).map(|time| time.ms).sum();
+                let build: f64 =
+                    passes.iter().filter(|time| time.pass.starts_with(TREE_BUILD_PREFIX)).map(|time| time.ms).sum();
                 if stage == "search" && build > 0.0 {
                     line("  build the tree", build);
                     line("  search the tree", search - build);

@@ -16,12 +16,12 @@ use super::spacing;
 use super::statistics::{Statistics, Values};
 use crate::args::InputArgs;
 use crate::exit::Failure;
-use crate::input::{FIRST_POINTS, Inputs, read_failure};
+use crate::input::{FIRST_POINTS_TIMEOUT, Inputs, read_failure};
 use crate::progress::Bar;
 
 /// Size in bytes from which files are read one at a time. Reading one uses all cores, and two might not fit into
 /// memory.
-const LARGE: u64 = 64 << 20;
+const LARGE_FILE_BYTES: u64 = 64 << 20;
 
 /// Examines inputs, several at a time.
 pub(super) struct Examiner {
@@ -39,12 +39,12 @@ pub(super) struct Examination {
 }
 
 /// Passes progress to the terminal and collects notes for the report.
-struct Listener<'a> {
+struct NoteCollector<'a> {
     bar: &'a Bar,
     notes: Mutex<Vec<String>>,
 }
 
-impl Progress for Listener<'_> {
+impl Progress for NoteCollector<'_> {
     fn report(&self, fraction: f32) {
         self.bar.report(fraction);
     }
@@ -85,9 +85,9 @@ impl Examiner {
         if !self.scan && header.points.is_some() && header.bounds.is_some() {
             return Ok(());
         }
-        let _alone = (bytes >= LARGE).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
+        let _alone = (bytes >= LARGE_FILE_BYTES).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
         let bar = Bar::on_file("reading", path, self.quiet);
-        let listener = Listener { bar: &bar, notes: Mutex::default() };
+        let listener = NoteCollector { bar: &bar, notes: Mutex::default() };
         let cloud = read_with(path, &self.options, &listener);
         for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
             report.warn(note);
@@ -102,7 +102,7 @@ impl Examiner {
     /// Describes a moving input by its container's summary and its first points.
     fn moving(&self, name: &str, source: &Source, report: &mut Report) -> Result<(), Error> {
         let bar = Bar::new(&format!("reading {name}"), self.quiet);
-        let listener = Listener { bar: &bar, notes: Mutex::default() };
+        let listener = NoteCollector { bar: &bar, notes: Mutex::default() };
         if let Source::Recording(path) = source {
             let summary = describe_recording(path, &listener)?;
             report.file_bytes = path.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
@@ -114,7 +114,7 @@ impl Examiner {
             let seconds = timeline.duration().as_secs_f64();
             report.details.insert(0, detail("frames", format!("{} in {seconds:.2} s", timeline.len())));
         }
-        let cloud = player.first(FIRST_POINTS, &listener)?;
+        let cloud = player.first(FIRST_POINTS_TIMEOUT, &listener)?;
         for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
             report.warn(note);
         }
@@ -127,7 +127,8 @@ impl Examiner {
 
     fn scene(&self, name: &str, report: &mut Report) -> Result<(), Error> {
         let (scene, count) = Scene::parse(name)?;
-        let _alone = (count as u64 * 16 >= LARGE).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
+        let _alone =
+            (count as u64 * 16 >= LARGE_FILE_BYTES).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
         let bar = Bar::new(&format!("generating {name}"), self.quiet);
         let cloud = scene.sample(count, &|done| {
             bar.report(done);

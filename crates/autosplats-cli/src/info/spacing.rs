@@ -10,16 +10,16 @@ use serde::Serialize;
 pub(super) const BYTES_PER_POINT: u64 = 18;
 
 /// Most points at which spacing and density are measured.
-const SAMPLES: usize = 10_000;
+const MAX_SAMPLES: usize = 10_000;
 
 /// Number of neighbours that the density is measured with.
-const NEIGHBORS: usize = 12;
+const DENSITY_NEIGHBORS: usize = 12;
 
 /// Most points of a leaf.
-const LEAF: usize = 16;
+const MAX_LEAF_POINTS: usize = 16;
 
 /// Least number of points of a subtree that is worth another thread.
-const PARALLEL: usize = 1 << 14;
+const MIN_PARALLEL_POINTS: usize = 1 << 14;
 
 /// Distance to the nearest other point, in the file's units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -39,7 +39,7 @@ pub(super) struct Density {
     pub(super) samples: usize,
 }
 
-/// Measures at up to [`SAMPLES`] points spread over the cloud. The choice of samples is deterministic.
+/// Measures at up to [`MAX_SAMPLES`] points spread over the cloud. The choice of samples is deterministic.
 pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) {
     let finite = |&(position, _): &([f32; 3], u32)| position.iter().all(|value| value.is_finite());
     let numbered = cloud.positions().par_iter().enumerate().map(|(i, position)| (*position, i as u32));
@@ -48,7 +48,7 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
         return (None, None);
     }
     // One random sample from each of equally many parts, in the file's order.
-    let samples = points.len().min(SAMPLES);
+    let samples = points.len().min(MAX_SAMPLES);
     let part = |i: usize| (points.len() as u128 * i as u128 / samples as u128) as usize;
     let sampled: Vec<_> = (0..samples)
         .map(|i| {
@@ -58,7 +58,7 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
         .collect();
 
     let tree = Tree::new(&mut points);
-    let count = NEIGHBORS.min(points.len() - 1);
+    let count = DENSITY_NEIGHBORS.min(points.len() - 1);
     let distances: Vec<(f64, f64)> = sampled
         .par_iter()
         .map(|&(position, index)| {
@@ -84,7 +84,7 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
     let median = densities[samples / 2];
     let density = Density { median, neighbors: count, samples };
     let finite = |spacing: &Spacing| spacing.mean.is_finite();
-    (Some(spacing).filter(finite), Some(density).filter(|_| count == NEIGHBORS && median.is_finite()))
+    (Some(spacing).filter(finite), Some(density).filter(|_| count == DENSITY_NEIGHBORS && median.is_finite()))
 }
 
 /// Number of points at exactly the position of an earlier one, by a 64-bit hash of the coordinates.
@@ -116,7 +116,7 @@ enum Tree {
 
 impl Tree {
     fn new(points: &mut [([f32; 3], u32)]) -> Self {
-        if points.len() <= LEAF {
+        if points.len() <= MAX_LEAF_POINTS {
             return Self::Leaf;
         }
         let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
@@ -132,7 +132,7 @@ impl Tree {
         points.select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
         let split = points[middle].0[axis];
         let (low, high) = points.split_at_mut(middle);
-        let children = if low.len() >= PARALLEL {
+        let children = if low.len() >= MIN_PARALLEL_POINTS {
             rayon::join(|| Self::new(low), || Self::new(high))
         } else {
             (Self::new(low), Self::new(high))

@@ -7,16 +7,16 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 /// Most bins of a histogram.
-const BINS: usize = 32;
+const MAX_BINS: usize = 32;
 
 /// Range of whole values up to which each value is counted.
-const MAX_COUNTED: f64 = 65536.0;
+const MAX_COUNTED_RANGE: f64 = 65536.0;
 
 /// Most distinct values that are listed.
-const MAX_LISTED: usize = 32;
+const MAX_LISTED_VALUES: usize = 32;
 
 /// Points per partial sum. Partial sums are added in order, so that results do not depend on the threads.
-const BLOCK: usize = 1 << 16;
+const BLOCK_POINTS: usize = 1 << 16;
 
 /// Source of the values.
 #[derive(Clone, Copy, Debug)]
@@ -103,7 +103,9 @@ impl Values<'_> {
 
     fn blocks(self) -> impl IndexedParallelIterator<Item = Range<usize>> {
         let len = self.len();
-        (0..len.div_ceil(BLOCK)).into_par_iter().map(move |block| block * BLOCK..((block + 1) * BLOCK).min(len))
+        (0..len.div_ceil(BLOCK_POINTS))
+            .into_par_iter()
+            .map(move |block| block * BLOCK_POINTS..((block + 1) * BLOCK_POINTS).min(len))
     }
 
     fn summary(self) -> Summary {
@@ -162,11 +164,11 @@ impl Statistics {
             not_finite,
             ..Self::default()
         };
-        if whole && range < MAX_COUNTED {
+        if whole && range < MAX_COUNTED_RANGE {
             let each = values.count(range as usize + 1, |value| (value - min) as usize);
             let distinct = each.iter().filter(|count| **count > 0).count();
             statistics.distinct = Some(distinct);
-            if classes || distinct <= MAX_LISTED {
+            if classes || distinct <= MAX_LISTED_VALUES {
                 let listed = each.iter().enumerate().filter(|(_, count)| **count > 0);
                 let name = |value: f64| classes.then(|| class_name(value)).flatten();
                 statistics.values = listed
@@ -176,13 +178,14 @@ impl Statistics {
                     })
                     .collect();
             }
-            let width = each.len().div_ceil(BINS);
+            let width = each.len().div_ceil(MAX_BINS);
             let counts: Vec<u64> = each.chunks(width).map(|bin| bin.iter().sum()).collect();
             let edges = (0..=counts.len()).map(|edge| min + (edge * width) as f64).collect();
             statistics.histogram = Some(Histogram { edges, counts });
         } else {
-            let counts = values.count(BINS, |value| ((value - min) / range * BINS as f64) as usize);
-            let edges = (0..=BINS).map(|edge| if edge == BINS { max } else { min + range * edge as f64 / BINS as f64 });
+            let counts = values.count(MAX_BINS, |value| ((value - min) / range * MAX_BINS as f64) as usize);
+            let edges = (0..=MAX_BINS)
+                .map(|edge| if edge == MAX_BINS { max } else { min + range * edge as f64 / MAX_BINS as f64 });
             statistics.histogram = Some(Histogram { edges: edges.collect(), counts });
         }
         statistics

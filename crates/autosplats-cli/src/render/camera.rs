@@ -25,12 +25,12 @@ pub(super) struct CameraJob {
     axes: Option<Axes>,
     fov_deg: Option<f64>,
     ortho: Option<Ortho>,
-    place: Place,
+    place: CameraPlacement,
 }
 
 /// Placement of the camera.
 #[derive(Debug)]
-enum Place {
+enum CameraPlacement {
     /// The camera of a file.
     File(PathBuf, Camera),
     /// At the flags' position. Missing values come from the points.
@@ -49,9 +49,9 @@ impl CameraJob {
             AxesChoice::Camera => Some(Axes::Camera),
         };
         let place = match (&args.camera, args.eye) {
-            (Some(path), _) => Place::File(path.clone(), load(path)?),
-            (None, Some(eye)) => Place::Eye { eye, look_at: args.look_at, up: args.up },
-            (None, None) => Place::Fitted(args.view),
+            (Some(path), _) => CameraPlacement::File(path.clone(), load(path)?),
+            (None, Some(eye)) => CameraPlacement::Eye { eye, look_at: args.look_at, up: args.up },
+            (None, None) => CameraPlacement::Fitted(args.view),
         };
         Ok(Self { axes, fov_deg: args.fov, ortho: args.ortho, place })
     }
@@ -59,7 +59,7 @@ impl CameraJob {
     /// The file of the camera.
     pub(super) fn file(&self) -> Option<&Path> {
         match &self.place {
-            Place::File(path, _) => Some(path),
+            CameraPlacement::File(path, _) => Some(path),
             _ => None,
         }
     }
@@ -67,9 +67,9 @@ impl CameraJob {
     /// Remedy for a picture that shows nothing.
     pub(super) fn remedy(&self) -> &'static str {
         match self.place {
-            Place::File(..) => "rendering without --camera",
-            Place::Eye { .. } => "rendering without --eye",
-            Place::Fitted(_) => "--view iso",
+            CameraPlacement::File(..) => "rendering without --camera",
+            CameraPlacement::Eye { .. } => "rendering without --eye",
+            CameraPlacement::Fitted(_) => "--view iso",
         }
     }
 
@@ -87,8 +87,8 @@ impl CameraJob {
         };
         let fitted = |view| fitted_by(view, self.projection());
         let mut camera = match self.place {
-            Place::File(_, camera) => return Ok((camera, axes)),
-            Place::Eye { eye, look_at, up } => {
+            CameraPlacement::File(_, camera) => return Ok((camera, axes)),
+            CameraPlacement::Eye { eye, look_at, up } => {
                 // An orthographic camera looks at the middle of the points.
                 let middle =
                     || fitted_by(Some(Side::Iso), Projection::OrthographicHeight(1.0)).map(|fitted| fitted.look_at);
@@ -100,7 +100,7 @@ impl CameraJob {
                 };
                 Camera { eye, look_at, up, projection }
             }
-            Place::Fitted(view) => match scene {
+            CameraPlacement::Fitted(view) => match scene {
                 Some(scene) if view.is_none() && self.ortho.is_none() => scene_camera(scene),
                 _ => fitted(view)?,
             },

@@ -9,7 +9,7 @@ use autosplats_film::{Target, has_ffmpeg, has_number};
 
 use super::job::Job;
 use super::moving::Moving;
-use super::pictures::{FrameReport, Shot, Style, Writer};
+use super::pictures::{FrameReport, QueuedPicture, Style, Writer};
 use super::{camera, live, schedule};
 use crate::device::Device;
 use crate::exit::Failure;
@@ -147,7 +147,7 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
     let bar = Bar::new(&format!("rendering {} frames", shown.len()), job.quiet);
     let notes = Notes::new(&bar, &job.inputs.names());
     let begun = Instant::now();
-    let mut tally = Tally::default();
+    let mut tally = FrameTally::default();
     let writer = Writer::start(film.style(job, rate));
     let mut render_all = || {
         for (number, &(frame, pictures)) in shown.iter().enumerate() {
@@ -167,7 +167,7 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let seconds = scene.times[frame] as f64 / 1e9;
             let report = FrameReport { frame, seconds, path, pictures, counts, read_ms, timings_ms };
-            if !writer.put(Shot { image: picture(job, &rendered, &writer), report }) {
+            if !writer.put(QueuedPicture { image: picture(job, &rendered, &writer), report }) {
                 // The writer has failed and reports why.
                 return Ok(());
             }
@@ -194,7 +194,7 @@ pub(super) fn picture(job: &Job, frame: &Frame<'_>, writer: &Writer) -> autospla
 
 /// Counts of rendered and skipped frames.
 #[derive(Default)]
-pub(super) struct Tally {
+pub(super) struct FrameTally {
     pub(super) written: usize,
     pub(super) kept: usize,
     milliseconds: f64,
@@ -202,7 +202,7 @@ pub(super) struct Tally {
     empty: Option<(usize, usize)>,
 }
 
-impl Tally {
+impl FrameTally {
     /// Counts a rendered frame.
     pub(super) fn count(&mut self, frame: usize, rendered: &Frame<'_>) {
         self.milliseconds += rendered.timings.frame;

@@ -34,7 +34,7 @@ pub(super) struct Job {
     /// Factor on both sides of the rendered picture, which is then averaged down.
     pub(super) supersample: u32,
     /// Whether the factor is the default.
-    pub(super) supersample_is_usual: bool,
+    pub(super) supersample_is_default: bool,
     pub(super) camera: CameraJob,
     pub(super) settings: Settings,
     pub(super) backend: Backend,
@@ -70,7 +70,7 @@ impl Job {
         };
         let needs_layers = pictures.iter().any(|picture| picture.format == Format::Exr);
         let is_still = film.is_none() && !needs_layers;
-        let supersample_is_usual = supersample.is_none();
+        let supersample_is_default = supersample.is_none();
         let supersample = supersample.unwrap_or(if is_still { still_supersample(size) } else { 1 });
         if needs_layers && supersample > 1 {
             return Err(Failure::usage(
@@ -120,7 +120,7 @@ impl Job {
             read_files,
             size,
             supersample,
-            supersample_is_usual,
+            supersample_is_default,
             camera,
             settings,
             backend,

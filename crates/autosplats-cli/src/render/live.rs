@@ -7,10 +7,10 @@ use autosplats::{Camera, Renderer};
 use autosplats_cloud::{Error, Player, PointCloud, Statistics};
 use autosplats_film::Target;
 
-use super::film::{FilmJob, Tally, picture};
+use super::film::{FilmJob, FrameTally, picture};
 use super::job::Job;
-use super::moving::Place;
-use super::pictures::{FrameReport, Shot, Writer};
+use super::moving::SharedPlacement;
+use super::pictures::{FrameReport, QueuedPicture, Writer};
 use super::{camera, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -20,7 +20,7 @@ use crate::output::check_target;
 use crate::progress::{Bar, Notes};
 
 /// Time to listen to one stream before the next.
-const TURN: Duration = Duration::from_millis(20);
+const STREAM_TIMEOUT: Duration = Duration::from_millis(20);
 
 /// Renders updates until the streams end, the requested number of pictures is reached, or Ctrl-C is pressed.
 pub(super) fn run(
@@ -38,17 +38,17 @@ pub(super) fn run(
     let mut streams = Streams::new(playing, &bar)?;
     // Pictures rendered so far are kept, also as a film.
     interrupt::end_gently();
-    let rate = film.fps.unwrap_or(schedule::USUAL_RATE);
+    let rate = film.fps.unwrap_or(schedule::DEFAULT_FPS);
     // A pipe's frames come as fast as they are read, so arrival times may be meaningless.
     let evenly = film.fps.is_some() && job.inputs.come_by_pipe() && !film.watch;
     let begun = Instant::now();
-    let mut tally = Tally::default();
-    let mut place = Place::default();
+    let mut tally = FrameTally::default();
+    let mut place = SharedPlacement::default();
     let (mut first_frame, mut frame): (Option<First>, usize) = (None, 0);
     let writer = Writer::start(film.style(job, rate));
     let is_film = matches!(film.target, Target::Film(_));
     // The film shows the last picture until the next one comes, at a time that is still unknown.
-    let mut shown: Option<Shot> = None;
+    let mut shown: Option<QueuedPicture> = None;
     let mut render_all = || {
         while !interrupt::ending() && film.frames.last.is_none_or(|last| frame <= last) {
             let waited = Instant::now();
@@ -76,7 +76,7 @@ pub(super) fn run(
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let path = film.file(frame);
             let report = FrameReport { frame, seconds, path, pictures: None, counts, read_ms, timings_ms };
-            let mut shot = Some(Shot { image: picture(job, &rendered, &writer), report });
+            let mut shot = Some(QueuedPicture { image: picture(job, &rendered, &writer), report });
             if is_film {
                 std::mem::swap(&mut shot, &mut shown);
             }
@@ -136,7 +136,7 @@ impl First {
 
 /// Hands a picture to the writer and returns whether it will be written. A film shows the picture until `until` seconds
 /// after the first, at least once.
-fn hand_over(mut shot: Shot, until: Option<f64>, rate: f64, tally: &mut Tally, writer: &Writer) -> bool {
+fn hand_over(mut shot: QueuedPicture, until: Option<f64>, rate: f64, tally: &mut FrameTally, writer: &Writer) -> bool {
     if let Some(until) = until {
         let pictures = ((until * rate).round() as usize).saturating_sub(tally.written).max(1);
         shot.report.pictures = Some(pictures);
@@ -178,7 +178,7 @@ impl<'a> Streams<'a> {
     }
 
     /// Waits for an update and returns all current points; `None` if all streams ended or Ctrl-C was pressed.
-    fn next(&mut self, place: &mut Place) -> Result<Option<Arc<PointCloud>>, Failure> {
+    fn next(&mut self, place: &mut SharedPlacement) -> Result<Option<Arc<PointCloud>>, Failure> {
         while !interrupt::ending() && self.inputs.iter().any(|stream| !stream.ended) {
             let mut news = false;
             for stream in self.inputs.iter_mut().filter(|stream| !stream.ended) {
@@ -215,7 +215,7 @@ impl Stream<'_> {
 
     /// Takes a new update and returns whether there was one.
     fn listen(&mut self) -> Result<bool, Failure> {
-        match self.input.player.next(TURN, &self.notes) {
+        match self.input.player.next(STREAM_TIMEOUT, &self.notes) {
             Ok(Some(cloud)) => {
                 self.cloud = Some(cloud);
                 return Ok(true);

@@ -55,7 +55,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let bar = Bar::spinner("rendering", job.quiet);
     match job.render(&mut renderer, &cloud, &camera) {
         // A device may lack the memory for supersampling by default; the picture is then rendered without.
-        Err(failure) if failure.exit == Exit::Memory && job.supersample > 1 && job.supersample_is_usual => {}
+        Err(failure) if failure.exit == Exit::Memory && job.supersample > 1 && job.supersample_is_default => {}
         frame => return placed.conclude(&job, &device, bar, frame?),
     }
     job.supersample = 1;

@@ -14,14 +14,14 @@ use crate::input::{Playing, read_failure};
 use crate::progress::Bar;
 
 /// Most frames that the camera is placed by.
-const PLACED_BY: usize = 5;
+const MAX_CAMERA_FRAMES: usize = 5;
 
 /// Inputs with timelines, played together.
 pub(super) struct Moving {
     playing: Vec<Playing>,
     /// Times at which something changes, in nanoseconds since the common start.
     pub(super) times: Vec<i64>,
-    place: Place,
+    place: SharedPlacement,
     /// Names of the inputs, for messages.
     names: String,
 }
@@ -43,7 +43,7 @@ impl Moving {
                 times
             }
         };
-        Self { playing, times, place: Place::default(), names }
+        Self { playing, times, place: SharedPlacement::default(), names }
     }
 
     /// The points at a frame.
@@ -69,7 +69,7 @@ impl Moving {
     ) -> Result<Camera, Failure> {
         let bar = Bar::on_input("placing the camera", &self.names, job.quiet);
         let last = frames.len() - 1;
-        let count = frames.len().min(PLACED_BY);
+        let count = frames.len().min(MAX_CAMERA_FRAMES);
         let mut looks: Vec<usize> = (0..count).map(|look| frames.start + last * look / (count - 1).max(1)).collect();
         looks.dedup();
         let mut clouds = Vec::new();
@@ -96,13 +96,13 @@ impl Moving {
 
 /// Conversion to metres and up axis, fixed by the first points so that all pictures share them.
 #[derive(Default)]
-pub(super) struct Place {
+pub(super) struct SharedPlacement {
     /// Conversion of degrees to metres.
     metres: Option<LocalMetres>,
     axes: Option<Axes>,
 }
 
-impl Place {
+impl SharedPlacement {
     /// Merges inputs with their poses.
     pub(super) fn merge(&mut self, mut parts: Vec<(Arc<PointCloud>, DMat4)>) -> Arc<PointCloud> {
         let mut cloud = match parts.pop() {

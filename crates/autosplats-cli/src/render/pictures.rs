@@ -13,7 +13,7 @@ use crate::interrupt;
 use crate::output::{ReadFiles, print_line, write_file, write_png};
 
 /// Most pictures in the queue.
-const QUEUE: usize = 2;
+const MAX_QUEUED_PICTURES: usize = 2;
 
 /// How and where pictures are written.
 #[derive(Debug)]
@@ -31,7 +31,7 @@ pub(super) struct Style {
 
 /// A picture, and the report that is printed once it is written.
 #[derive(Debug)]
-pub(super) struct Shot {
+pub(super) struct QueuedPicture {
     pub(super) image: Image,
     pub(super) report: FrameReport,
 }
@@ -57,7 +57,7 @@ pub(super) struct FrameReport {
 /// Thread that writes pictures in the order of their arrival.
 pub(super) struct Writer {
     /// Pictures to write; `None` marks the end.
-    queue: SyncSender<Option<Shot>>,
+    queue: SyncSender<Option<QueuedPicture>>,
     /// Written images, whose memory is used again: fresh memory is slow.
     spare: Receiver<Image>,
     thread: JoinHandle<Result<(), Failure>>,
@@ -65,7 +65,7 @@ pub(super) struct Writer {
 
 impl Writer {
     pub(super) fn start(style: Style) -> Self {
-        let (queue, shots) = sync_channel(QUEUE);
+        let (queue, shots) = sync_channel(MAX_QUEUED_PICTURES);
         let (written, spare) = channel();
         let thread = std::thread::spawn(move || match &style.target {
             Target::Frames(names) => write_frames(&style, names, &shots, &written),
@@ -84,7 +84,7 @@ impl Writer {
     }
 
     /// Queues a picture and returns whether it will be written. If not, [`finish`](Self::finish) returns the reason.
-    pub(super) fn put(&self, shot: Shot) -> bool {
+    pub(super) fn put(&self, shot: QueuedPicture) -> bool {
         self.queue.send(Some(shot)).is_ok()
     }
 
@@ -102,10 +102,10 @@ impl Writer {
 fn write_frames(
     style: &Style,
     names: &Frames,
-    shots: &Receiver<Option<Shot>>,
+    shots: &Receiver<Option<QueuedPicture>>,
     written: &Sender<Image>,
 ) -> Result<(), Failure> {
-    for Shot { image, report } in shots.iter().flatten() {
+    for QueuedPicture { image, report } in shots.iter().flatten() {
         let path = names.file(report.frame);
         style.inputs.check(&path)?;
         write_file(&path, |writer| write_png(&image, style.alpha, writer))?;
@@ -121,7 +121,7 @@ fn write_frames(
 fn write_film(
     style: &Style,
     path: &std::path::Path,
-    shots: &Receiver<Option<Shot>>,
+    shots: &Receiver<Option<QueuedPicture>>,
     written: &Sender<Image>,
 ) -> Result<(), Failure> {
     let mut reports = Vec::new();
@@ -131,7 +131,7 @@ fn write_film(
         let mut film = Film::begin(path, style.size, style.rate).map_err(film_failure)?;
         let mut complete = false;
         for shot in shots {
-            let Some(Shot { image, report }) = shot else {
+            let Some(QueuedPicture { image, report }) = shot else {
                 complete = true;
                 break;
             };

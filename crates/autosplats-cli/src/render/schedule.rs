@@ -3,17 +3,17 @@
 use crate::exit::Failure;
 
 /// Pictures per second of a film whose frames have no rate of their own.
-pub(super) const USUAL_RATE: f64 = 30.0;
+pub(super) const DEFAULT_FPS: f64 = 30.0;
 /// Largest difference of equal times, in nanoseconds; stamps are rounded.
-const ROUNDING: i64 = 1000;
+const STAMP_ROUNDING_NS: i64 = 1000;
 /// Most pictures of a film. Longer films have broken time stamps.
-const MOST_PICTURES: f64 = 1e6;
+const MAX_FILM_PICTURES: f64 = 1e6;
 
 /// Frames per second of evenly spaced frames; otherwise the default rate.
 pub(super) fn rate(times: &[i64]) -> f64 {
     match step(times) {
         Some(step) if is_even(times, step) => 1e9 / step,
-        _ => USUAL_RATE,
+        _ => DEFAULT_FPS,
     }
 }
 
@@ -25,7 +25,7 @@ fn step(times: &[i64]) -> Option<f64> {
 
 fn is_even(times: &[i64], step: f64) -> bool {
     let expected = |index: usize| times[0].saturating_add((index as f64 * step).round() as i64);
-    times.iter().enumerate().all(|(index, time)| time.abs_diff(expected(index)) <= ROUNDING.unsigned_abs())
+    times.iter().enumerate().all(|(index, time)| time.abs_diff(expected(index)) <= STAMP_ROUNDING_NS.unsigned_abs())
 }
 
 /// Frames that a film of `rate` pictures per second shows, each with its number of successive pictures. Each picture
@@ -36,18 +36,19 @@ fn is_even(times: &[i64], step: f64) -> bool {
 pub(super) fn resample(times: &[i64], rate: f64, name: &str) -> Result<Vec<(usize, usize)>, Failure> {
     let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return Ok(Vec::new()) };
     let end = last.abs_diff(first) as f64 + step(times).unwrap_or(1e9 / rate);
-    if end * rate * 1e-9 > MOST_PICTURES {
+    if end * rate * 1e-9 > MAX_FILM_PICTURES {
         let seconds = end * 1e-9;
-        let why = format!("a film of {seconds:.0} s has more than {MOST_PICTURES} pictures at {rate:.0} per second");
+        let why =
+            format!("a film of {seconds:.0} s has more than {MAX_FILM_PICTURES} pictures at {rate:.0} per second");
         return Err(Failure::usage(format!("{name}: {why}; if its time stamps jump, choose a part with --frames")));
     }
     let mut shown: Vec<(usize, usize)> = Vec::new();
     for picture in 0_u32.. {
         let time = (f64::from(picture) * 1e9 / rate).round() as i64;
-        if picture > 0 && time.saturating_add(ROUNDING) as f64 >= end {
+        if picture > 0 && time.saturating_add(STAMP_ROUNDING_NS) as f64 >= end {
             break;
         }
-        let by_then = |&stamp: &i64| stamp.saturating_sub(first) <= time + ROUNDING;
+        let by_then = |&stamp: &i64| stamp.saturating_sub(first) <= time + STAMP_ROUNDING_NS;
         let frame = times.partition_point(by_then).saturating_sub(1);
         match shown.last_mut() {
             Some((last, pictures)) if *last == frame => *pictures += 1,
@@ -81,7 +82,7 @@ mod tests {
     #[test]
     fn uneven_frames_play_at_their_own_speed() {
         let times = at(&[0, 100, 150, 1005, 1010, 1200]);
-        assert_eq!(rate(&times), USUAL_RATE, "no rate is theirs");
+        assert_eq!(rate(&times), DEFAULT_FPS, "no rate is theirs");
         let shown = resample(&times, 10.0, "").expect("a film");
         // Pictures are at 0, 100, 200 ms and so on, to 1200 ms and 240 ms beyond. The frame at 1005 ms is never the
         // newest.

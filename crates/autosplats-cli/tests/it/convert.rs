@@ -62,7 +62,7 @@ fn points_are_taken_out_in_order() {
 }
 
 #[test]
-fn a_mesh_is_strewn_with_points() {
+fn a_mesh_is_sampled() {
     let folder = Folder::with_sphere();
     folder.write("square.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n");
     folder.succeed(&["convert", "square.obj", "out.ply", "--sample", "5K"]);

@@ -4,7 +4,7 @@ use crate::common::Folder;
 use serde_json::Value;
 
 #[test]
-fn a_healthy_machine_is_told_so() {
+fn a_healthy_machine_is_reported() {
     let folder = Folder::new();
     let text = folder.succeed(&["doctor"]).stdout;
     for said in ["cpu", "gpu", "gpu", "thread", "simd", "memory", "points can be rendered", "read back", "PLY"] {

@@ -1,7 +1,7 @@
 //! `render` of points that move.
 
 #[cfg(unix)]
-use crate::common::KEEP;
+use crate::common::STORE_INPUT;
 use crate::common::{Folder, Outcome};
 use serde_json::Value;
 
@@ -55,7 +55,7 @@ fn frames_are_chosen_and_numbered_as_they_are() {
 }
 
 #[test]
-fn what_is_there_is_not_made_again() {
+fn resume_skips_existing_pictures() {
     let folder = folder();
     folder.write("f_1.png", "kept");
     render(&folder, &["--resume", "-o", "f_%d.png"]);
@@ -88,7 +88,7 @@ fn a_folder_alone_is_its_first_frame() {
 }
 
 #[test]
-fn a_frame_that_cannot_be_read_is_told_and_passed_over() {
+fn an_unreadable_frame_is_reported_and_skipped() {
     let folder = folder();
     folder.write("sweep/scan_2.xyz", "this is no cloud\n");
     let out = folder.succeed(&["render", "sweep", "--size", "120x90", "-o", "f_%d.png"]);
@@ -98,7 +98,7 @@ fn a_frame_that_cannot_be_read_is_told_and_passed_over() {
 }
 
 #[test]
-fn frames_that_show_nothing_are_told() {
+fn empty_frames_are_reported() {
     let folder = folder();
     let out = folder.succeed(&["render", "sweep", "--eye", "15,15,2", "--look-at", "15,15.1,12", "-o", "f_%d.png"]);
     assert_eq!(pictures(&folder).len(), 4, "they have a picture as well");
@@ -156,7 +156,7 @@ fn no_picture_takes_the_place_of_an_input() {
 }
 
 #[test]
-fn a_picture_that_cannot_be_written_is_not_told_of() {
+fn an_unwritable_picture_is_not_reported() {
     let folder = folder();
     // A folder blocks the third picture.
     std::fs::create_dir(folder.path("f_2.png")).expect("a folder");
@@ -239,7 +239,7 @@ fn recordings_made_at_once_are_shown_at_once() {
 #[test]
 fn a_film_shows_each_frame_for_as_long_as_it_lasts() {
     let folder = folder();
-    let out = film(&folder, KEEP, &["sweep", "--fps", "12.5", "--json"]);
+    let out = film(&folder, STORE_INPUT, &["sweep", "--fps", "12.5", "--json"]);
     assert_eq!(out.code, Some(0), "{}", out.stderr);
     assert_eq!(film_pictures(&folder).len(), 4, "even frames have a picture each");
     assert!(folder.read("words").starts_with(b"-loglevel error -y"), "by ffmpeg");
@@ -249,7 +249,7 @@ fn a_film_shows_each_frame_for_as_long_as_it_lasts() {
     assert!(lines.len() == 4 && lines.iter().all(|line| line["pictures"] == 1 && line["path"].is_null()), "{lines:?}");
 
     std::fs::write(folder.path("drive.mcap"), recording(&[0, 100, 500, 520])).expect("a recording");
-    let out = film(&folder, KEEP, &["drive.mcap", "--fps", "10", "--json"]);
+    let out = film(&folder, STORE_INPUT, &["drive.mcap", "--fps", "10", "--json"]);
     assert_eq!(out.code, Some(0), "{}", out.stderr);
     let lines: Vec<Value> = out.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let shown: Vec<_> = lines.iter().map(|line| (line["frame"].as_u64(), line["pictures"].as_u64())).collect();
@@ -263,9 +263,9 @@ fn a_film_shows_each_frame_for_as_long_as_it_lasts() {
 
 #[cfg(unix)]
 #[test]
-fn a_film_that_fails_is_not_told_of() {
+fn a_failed_film_is_not_reported() {
     let folder = folder();
-    film(&folder, KEEP, &["sweep", "--quiet"]);
+    film(&folder, STORE_INPUT, &["sweep", "--quiet"]);
     let whole = folder.read("f.mp4");
     let out = film(&folder, "cat > /dev/null; echo full >&2; exit 1", &["sweep", "--json", "--frames", "0..1"]);
     assert_eq!(out.code, Some(4), "{}", out.stderr);

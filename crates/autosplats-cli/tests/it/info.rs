@@ -179,7 +179,7 @@ fn text_has_the_digits_that_it_has() {
 }
 
 #[test]
-fn colors_are_told_as_stored() {
+fn colors_are_reported_as_stored() {
     let folder = Folder::new();
     let fields = ["float x", "float y", "float z", "ushort red", "ushort green", "ushort blue"];
     let rows = (0..20).map(|i| format!("{i} 0 0 {} 0 65535", 257 * i));

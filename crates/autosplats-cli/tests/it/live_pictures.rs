@@ -23,16 +23,17 @@ use autosplats::{
 };
 
 const POINTS: usize = 100_000;
-/// Size of the first `FIRST` pictures. The size may then shrink in up to `STEPS` steps, each after as many pictures.
+/// Size of the first `PICTURES_PER_STEP` pictures. The size may then shrink in up to `STEPS` steps, each after as many
+/// pictures.
 const SIZE: [u32; 2] = [960, 540];
-const FIRST: usize = 100;
+const PICTURES_PER_STEP: usize = 100;
 const STEPS: usize = 3;
 /// Milliseconds between messages.
-const PERIOD: f64 = 50.0;
+const PERIOD_MS: f64 = 50.0;
 /// Fraction of the period that a picture may take, as in the window.
-const SHARE: f64 = 0.6;
+const MAX_PERIOD_FRACTION: f64 = 0.6;
 /// Largest growth of memory from the first minute to the end, in megabytes.
-const GROWTH: f64 = 20.0;
+const MAX_GROWTH_MB: f64 = 20.0;
 
 fn now() -> i64 {
     UNIX_EPOCH.elapsed().unwrap().as_nanos() as i64
@@ -90,16 +91,16 @@ fn ten_minutes_of_live_points_become_pictures() {
         latest.put(0, update);
         let cloud = latest.cloud();
         assert_eq!(cloud.len(), POINTS, "whole");
-        if since_taken.len() == FIRST && steps < STEPS {
+        if since_taken.len() == PICTURES_PER_STEP && steps < STEPS {
             // The first second is left out, since the program has just started.
-            let [median, ..] = percentiles(&since_taken[FIRST / 5..]);
+            let [median, ..] = percentiles(&since_taken[PICTURES_PER_STEP / 5..]);
             println!(
                 "{} x {}: {}; from taking {median:.1}",
                 size[0],
                 size[1],
-                shown(percentiles(&since_sent[FIRST / 5..]))
+                shown(percentiles(&since_sent[PICTURES_PER_STEP / 5..]))
             );
-            let scale = (SHARE * PERIOD / median).sqrt().min(1.0);
+            let scale = (MAX_PERIOD_FRACTION * PERIOD_MS / median).sqrt().min(1.0);
             size = size.map(|side| (f64::from(side) * scale) as u32);
             (since_sent, since_taken) = (Vec::new(), Vec::new());
             steps += 1;
@@ -137,8 +138,11 @@ fn ten_minutes_of_live_points_become_pictures() {
     assert_eq!(told.taken + told.dropped, sent, "none is lost unless it is counted: {told:?}");
     assert_eq!((kept.shown, kept.late + kept.duplicates), (told.taken, 0), "each that was taken is shown: {kept:?}");
     let grown = memory[memory.len() - 1] - memory[0];
-    assert!(grown < GROWTH, "memory grew by {grown:.0} MB");
+    assert!(grown < MAX_GROWTH_MB, "memory grew by {grown:.0} MB");
     assert!(size[0] >= SIZE[0] / 3, "{size:?} is hardly a picture");
     let [median, ..] = percentiles(&since_sent);
-    assert!(median < PERIOD, "{median:.1} ms from sending to the picture, where the next message comes after {PERIOD}");
+    assert!(
+        median < PERIOD_MS,
+        "{median:.1} ms from sending to the picture, where the next message comes after {PERIOD_MS}"
+    );
 }

@@ -71,7 +71,7 @@ fn each_update_has_a_picture_as_it_comes() {
 }
 
 #[test]
-fn so_many_are_enough() {
+fn rendering_stops_at_the_last_frame() {
     let folder = Folder::new();
     let mut child = start(&folder, &["-", "--frames", "1..2", "-o", "f_%d.png", "--quiet"]);
     let mut pipe = input(&mut child);
@@ -128,7 +128,7 @@ fn ctrl_c_ends_it_and_leaves_whole_files() {
 #[test]
 fn a_film_of_what_is_live_takes_as_long_as_it_took() {
     let folder = Folder::new();
-    let path = folder.with_ffmpeg(crate::common::KEEP);
+    let path = folder.with_ffmpeg(crate::common::STORE_INPUT);
     let mut command = folder.command(&["render", "-", "-o", "f.mp4", "--size", "40x30", "--json"]);
     command.env("PATH", path).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().expect("it starts");
@@ -155,7 +155,7 @@ fn a_film_of_what_is_live_takes_as_long_as_it_took() {
 #[test]
 fn a_film_of_a_pipe_has_as_many_frames_a_second_as_are_asked_for() {
     let folder = Folder::new();
-    let path = folder.with_ffmpeg(crate::common::KEEP);
+    let path = folder.with_ffmpeg(crate::common::STORE_INPUT);
     let mut command = folder.command(&["render", "-", "-o", "f.mp4", "--fps", "20", "--size", "40x30", "--json"]);
     command.env("PATH", path).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().expect("it starts");

@@ -13,9 +13,9 @@ use x11rb::protocol::xproto::{
 use x11rb::rust_connection::RustConnection;
 
 /// Longest time of a step on a busy machine.
-const WAIT: Duration = Duration::from_secs(120);
+const STEP_TIMEOUT: Duration = Duration::from_secs(120);
 /// Time between two screenshots.
-const LOOK: Duration = Duration::from_millis(400);
+const SCREENSHOT_INTERVAL: Duration = Duration::from_millis(400);
 
 /// X11 symbols of keys.
 pub(crate) mod keys {
@@ -183,8 +183,8 @@ impl Screen {
                 break window;
             }
             self.check_alive();
-            assert!(start.elapsed() < WAIT, "there is no window after {WAIT:?}");
-            std::thread::sleep(LOOK);
+            assert!(start.elapsed() < STEP_TIMEOUT, "there is no window after {STEP_TIMEOUT:?}");
+            std::thread::sleep(SCREENSHOT_INTERVAL);
         };
         self.connection
             .set_input_focus(InputFocus::PARENT, window, x11rb::CURRENT_TIME)
@@ -213,13 +213,13 @@ impl Screen {
     pub(crate) fn finish(&mut self) -> Option<i32> {
         let start = Instant::now();
         let program = self.program.as_mut().expect("a program runs");
-        while start.elapsed() < WAIT {
+        while start.elapsed() < STEP_TIMEOUT {
             if let Some(status) = program.try_wait().expect("the program can be asked") {
                 return status.code();
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(SCREENSHOT_INTERVAL);
         }
-        panic!("the program still runs after {WAIT:?}");
+        panic!("the program still runs after {STEP_TIMEOUT:?}");
     }
 
     /// Takes a screenshot.
@@ -232,9 +232,9 @@ impl Screen {
     }
 
     /// Waits until the screen shows what `is` accepts and two screenshots are equal. Saves the picture. Panics after
-    /// `WAIT`.
+    /// `STEP_TIMEOUT`.
     pub(crate) fn settled(&mut self, name: &str, is: impl Fn(&Picture) -> bool) -> Picture {
-        self.wait(name, WAIT, is).unwrap_or_else(|| panic!("step '{name}' is not seen after {WAIT:?}"))
+        self.wait(name, STEP_TIMEOUT, is).unwrap_or_else(|| panic!("step '{name}' is not seen after {STEP_TIMEOUT:?}"))
     }
 
     /// Like [`settled`](Self::settled), but returns `None` after `time`.
@@ -242,7 +242,7 @@ impl Screen {
         let start = Instant::now();
         let mut last = self.look();
         loop {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(SCREENSHOT_INTERVAL);
             self.check_alive();
             let now = self.look();
             let done = now == last && is(&now);
@@ -324,10 +324,10 @@ impl Screen {
             self.connection.create_window(0, window, self.root, 0, 0, 1, 1, 0, class, x11rb::COPY_FROM_PARENT, &aux);
         made.expect("asked").check().expect("a window that nobody sees");
         let start = Instant::now();
-        while start.elapsed() < WAIT {
+        while start.elapsed() < STEP_TIMEOUT {
             let asked = self.connection.convert_selection(window, clipboard, text, place, x11rb::CURRENT_TIME);
             asked.expect("asked").check().expect("the screen has a clipboard");
-            std::thread::sleep(LOOK);
+            std::thread::sleep(SCREENSHOT_INTERVAL);
             while let Some(event) = self.connection.poll_for_event().expect("the screen is there") {
                 if matches!(&event, Event::SelectionNotify(answer) if answer.property == place) {
                     let asked = self.connection.get_property(true, window, place, AtomEnum::ANY, 0, u32::MAX / 4);

@@ -8,12 +8,12 @@ use std::{
 
 use glam::DMat4;
 
-use super::clock::{Clock, Order};
+use super::clock::{Clock, StampOrder};
 use crate::{PointCloud, Update};
 
 /// A stamp older than the newest by more than this means a restarted clock or recording. By less, messages may have
 /// overtaken each other, unless several consecutive ones increase among themselves.
-const JUMP: Duration = Duration::from_secs(1);
+const MIN_RESTART_JUMP: Duration = Duration::from_secs(1);
 
 /// Which older points [`Latest`] keeps beside the newest.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -83,7 +83,7 @@ pub struct Latest {
 #[derive(Debug, Default)]
 struct Sensor {
     /// Sorted by stamp.
-    kept: VecDeque<Kept>,
+    kept: VecDeque<KeptUpdate>,
     clock: Clock,
     /// Arrival number of the first update that may belong to a clock that was set back.
     since: u64,
@@ -92,7 +92,7 @@ struct Sensor {
 }
 
 #[derive(Debug)]
-struct Kept {
+struct KeptUpdate {
     stamp: i64,
     arrival: u64,
     cloud: Arc<PointCloud>,
@@ -145,24 +145,24 @@ impl Latest {
         }
         let accumulate = self.options.accumulate;
         let keeps = self.options.decay.unwrap_or_default();
-        let jump = keeps.max(JUMP);
+        let jump = keeps.max(MIN_RESTART_JUMP);
         let behind = |sensor: &Sensor| {
             let newest = sensor.kept.back().map_or(i64::MIN, |kept| kept.stamp);
             Duration::from_nanos(newest.saturating_sub(stamp).max(0).unsigned_abs())
         };
         let mut restarted = false;
         // With `accumulate`, a single stamp must not remove everything.
-        match sensor.clock.hear(stamp, if accumulate { Duration::MAX } else { jump }) {
-            Order::Onward => {}
-            Order::Behind { first } => sensor.since = if first { self.arrivals } else { sensor.since },
+        match sensor.clock.receive(stamp, if accumulate { Duration::MAX } else { jump }) {
+            StampOrder::Onward => {}
+            StampOrder::Behind { first } => sensor.since = if first { self.arrivals } else { sensor.since },
             // With `accumulate`, late points are shown like any others, so a small step back removes nothing.
-            Order::Restarted { first } if !accumulate || behind(sensor) > jump => {
+            StampOrder::Restarted { first } if !accumulate || behind(sensor) > jump => {
                 let since = if first { self.arrivals } else { sensor.since };
                 sensor.kept.retain(|kept| kept.arrival >= since);
                 self.statistics.restarted += 1;
                 restarted = true;
             }
-            Order::Restarted { .. } => {}
+            StampOrder::Restarted { .. } => {}
         }
         let at = sensor.kept.partition_point(|kept| kept.stamp < stamp);
         if sensor.kept.get(at).is_some_and(|kept| kept.stamp == stamp) {
@@ -173,7 +173,7 @@ impl Latest {
             self.statistics.late += 1;
             return Arrival::Late;
         }
-        sensor.kept.insert(at, Kept { stamp, arrival: self.arrivals, cloud });
+        sensor.kept.insert(at, KeptUpdate { stamp, arrival: self.arrivals, cloud });
         self.arrivals += 1;
         self.statistics.shown += 1;
         self.merged = None;

@@ -42,7 +42,7 @@ const SEQUENCE_FPS: f64 = 10.0;
 /// Default frames per second of an animated glTF or scene.
 const MOTION_FPS: f64 = 30.0;
 /// How long [`Source::read`] waits for the first points of a live stream.
-const FIRST_POINTS: Duration = Duration::from_secs(10);
+const FIRST_POINTS_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// An input of points.
 #[derive(Clone, Debug)]
@@ -178,7 +178,8 @@ impl Source {
                 !progress.cancelled()
             }),
             moving => {
-                let cloud = moving.play(&PlayOptions::default(), options, progress)?.first(FIRST_POINTS, progress)?;
+                let cloud =
+                    moving.play(&PlayOptions::default(), options, progress)?.first(FIRST_POINTS_TIMEOUT, progress)?;
                 Ok(Arc::unwrap_or_clone(cloud))
             }
         }

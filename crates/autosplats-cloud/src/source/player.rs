@@ -11,10 +11,10 @@ use super::latest::{Latest, LatestOptions, LatestStatistics};
 use crate::{Error, Next, PointCloud, Progress, Stream, Update};
 
 /// Longest wait between two checks for cancellation.
-const STEP: Duration = Duration::from_millis(100);
+const MAX_WAIT: Duration = Duration::from_millis(100);
 
 /// How many earlier frames of the same channel are tried when a frame cannot be read.
-const STEPS_BACK: usize = 16;
+const MAX_STEPS_BACK: usize = 16;
 
 /// Plays a stream: builds the cloud that is visible at a frame of the timeline, or now for a live stream.
 ///
@@ -68,7 +68,7 @@ impl Player {
         for &needed in all.iter().filter(|&&needed| after.is_none_or(|after| needed > after)) {
             // If a frame cannot be read, an earlier one takes its place, as in uninterrupted playback.
             let mut next = Some(needed);
-            for _ in 0..=STEPS_BACK {
+            for _ in 0..=MAX_STEPS_BACK {
                 let Some(tried) = next.filter(|&next| after.is_none_or(|after| next > after)) else { break };
                 if self.put(tried, progress)? {
                     break;
@@ -120,7 +120,7 @@ impl Player {
         }
         let (mut since, mut received) = (Instant::now(), self.stream.received());
         while let Some(left) = patience.checked_sub(since.elapsed()) {
-            if let Some(cloud) = self.next(left.min(STEP), progress)? {
+            if let Some(cloud) = self.next(left.min(MAX_WAIT), progress)? {
                 return Ok(cloud);
             }
             let now = self.stream.received();

@@ -158,7 +158,7 @@ fn a_cancelled_frame_is_still_the_next_one() {
 }
 
 #[test]
-fn strewn_points_stay_at_their_places_on_a_moving_mesh() {
+fn samples_stay_at_their_places_on_a_moving_mesh() {
     let Some(data) = shared_data() else { return };
     let horse = sequence(data.join("animation/horse_gallop").to_str().unwrap()).unwrap().sampled(20_000, &()).unwrap();
     let [first, second, again] = [0, 1, 24].map(|index| frame(&horse, index));
@@ -173,7 +173,7 @@ fn strewn_points_stay_at_their_places_on_a_moving_mesh() {
 }
 
 #[test]
-fn points_without_a_mesh_cannot_be_strewn() {
+fn points_without_a_mesh_cannot_be_sampled() {
     let Some(data) = shared_data() else { return };
     let drive = sequence(data.join("sequences/kitti_drive_pcd").to_str().unwrap()).unwrap();
     assert!(matches!(drive.sampled(100, &()), Err(Error::NoSurface)), "sweeps of a lidar");
@@ -242,8 +242,8 @@ fn a_gltf_changes_shape_and_turns() {
         DVec3::new(5.0, 1.0, 0.0),
         "as a cloud it has its base shape"
     );
-    let strewn = moving.sampled(500, &()).unwrap();
-    assert_eq!((frame(&strewn, 0).len(), frame(&strewn, 3).len()), (500, 500), "strewn over it");
+    let sampled_mesh = moving.sampled(500, &()).unwrap();
+    assert_eq!((frame(&sampled_mesh, 0).len(), frame(&sampled_mesh, 3).len()), (500, 500), "strewn over it");
 }
 
 #[test]

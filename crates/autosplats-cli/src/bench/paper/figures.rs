@@ -7,16 +7,16 @@ use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::measure::{K, Loaded};
+use super::measure::{K, LoadedScene};
 use super::scenes::generated;
 use crate::exit::Failure;
 use crate::output::{write_file, write_png};
 use crate::render::render_failure;
 
 /// Gap between pictures side by side, in pixels.
-const GAP: u32 = 8;
+const GAP_PX: u32 = 8;
 /// Splat scale at which single splats are distinguishable.
-const APART: f32 = 0.35;
+const SEPARATE_SPLAT_SCALE: f32 = 0.35;
 
 /// Angles between normals computed on the fly and precomputed ones, in degrees.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -40,8 +40,8 @@ pub(super) struct Radii {
 }
 
 /// Renders the scene as measured, at half the size.
-pub(super) fn picture(loaded: &Loaded<'_>, path: &Path) -> Result<(), Failure> {
-    let Loaded { scene, cloud, camera } = loaded;
+pub(super) fn picture(loaded: &LoadedScene<'_>, path: &Path) -> Result<(), Failure> {
+    let LoadedScene { scene, cloud, camera } = loaded;
     let size = scene.size.map(|side| side / 2);
     let mut renderer = Renderer::new();
     let frame = renderer.render(cloud, camera, size, &Settings::default()).map_err(render_failure)?;
@@ -49,8 +49,8 @@ pub(super) fn picture(loaded: &Loaded<'_>, path: &Path) -> Result<(), Failure> {
 }
 
 /// Figure 6: normals on the fly beside precomputed ones, by the same estimator.
-pub(super) fn normals(loaded: &Loaded<'_>, side: u32, path: &Path) -> Result<NormalError, Failure> {
-    let Loaded { cloud, camera, .. } = loaded;
+pub(super) fn normals(loaded: &LoadedScene<'_>, side: u32, path: &Path) -> Result<NormalError, Failure> {
+    let LoadedScene { cloud, camera, .. } = loaded;
     let size = [side, side];
     let settings = Settings::default();
     let mut renderer = Renderer::new();
@@ -100,7 +100,7 @@ pub(super) fn scales(count: usize, side: u32, quiet: bool, path: &Path) -> Resul
     let near = zoomed(&camera, middle, 7.0);
 
     let mut apart = Settings::default();
-    apart.reconstruction.splat_scale = APART;
+    apart.reconstruction.splat_scale = SEPARATE_SPLAT_SCALE;
     let mut colored = Settings::default();
     colored.shading.color = ColorMode::KRadius;
     let plain = Settings::default();
@@ -125,8 +125,8 @@ pub(super) fn scales(count: usize, side: u32, quiet: bool, path: &Path) -> Resul
 }
 
 /// Figure 9: a scan, a closer view, and the curvature there.
-pub(super) fn curvature(loaded: &Loaded<'_>, side: u32, path: &Path) -> Result<(), Failure> {
-    let Loaded { cloud, camera, .. } = loaded;
+pub(super) fn curvature(loaded: &LoadedScene<'_>, side: u32, path: &Path) -> Result<(), Failure> {
+    let LoadedScene { cloud, camera, .. } = loaded;
     let near = closer(cloud, camera);
     let mut colored = Settings::default();
     colored.shading.color = ColorMode::Curvature;
@@ -161,7 +161,7 @@ fn zoomed(camera: &Camera, look_at: DVec3, times: f64) -> Camera {
 /// Writes pictures of equal height side by side, with white gaps.
 fn write_side_by_side(images: &[&Image], path: &Path) -> Result<(), Failure> {
     let height = images.iter().map(|image| image.height).max().unwrap_or(1);
-    let width = images.iter().map(|image| image.width + GAP).sum::<u32>() - GAP;
+    let width = images.iter().map(|image| image.width + GAP_PX).sum::<u32>() - GAP_PX;
     let mut pixels = vec![[255; 4]; (width * height) as usize];
     let mut left = 0;
     for image in images {
@@ -169,7 +169,7 @@ fn write_side_by_side(images: &[&Image], path: &Path) -> Result<(), Failure> {
             let at = row * width as usize + left as usize;
             pixels[at..at + line.len()].copy_from_slice(line);
         }
-        left += image.width + GAP;
+        left += image.width + GAP_PX;
     }
     let joined = Image { width, height, pixels, ..Image::default() };
     write_file(path, |writer| write_png(&joined, false, writer)).map(|_| ())
@@ -200,9 +200,9 @@ mod tests {
         let image = |value| Image { width: 3, height: 2, pixels: vec![[value; 4]; 6], ..Image::default() };
         write_side_by_side(&[&image(1), &image(2)], &path)?;
         let joined = image::open(&path).expect("a picture").to_rgb8();
-        assert_eq!(joined.dimensions(), (6 + GAP, 2));
+        assert_eq!(joined.dimensions(), (6 + GAP_PX, 2));
         assert_eq!(
-            [joined.get_pixel(2, 1)[0], joined.get_pixel(4, 0)[0], joined.get_pixel(3 + GAP, 1)[0]],
+            [joined.get_pixel(2, 1)[0], joined.get_pixel(4, 0)[0], joined.get_pixel(3 + GAP_PX, 1)[0]],
             [1, 255, 2]
         );
         Ok(())

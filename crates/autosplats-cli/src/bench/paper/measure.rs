@@ -8,7 +8,7 @@ use autosplats_cloud::PointCloud;
 use serde::{Deserialize, Serialize};
 
 use super::scenes::PaperScene;
-use crate::bench::{BUILD, median};
+use crate::bench::{TREE_BUILD_PREFIX, median};
 use crate::device::Device;
 use crate::exit::Failure;
 use crate::render::render_failure;
@@ -20,9 +20,9 @@ const ACCURACY: f64 = 0.999;
 /// Time in milliseconds above which a frame is measured only once, at its first run.
 const SLOW_MS: f64 = 3000.0;
 /// Largest relative difference of equal k-radii.
-const SAME: f32 = 1e-4;
+const MAX_RADIUS_DIFFERENCE: f32 = 1e-4;
 /// Largest difference of equal pixels, in levels of 255.
-const SEEN: u8 = 2;
+const MAX_LEVEL_DIFFERENCE: u8 = 2;
 
 /// A search engine on a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,7 +160,7 @@ impl Renderers {
 
 /// A scene ready for rendering.
 #[derive(Debug)]
-pub(super) struct Loaded<'a> {
+pub(super) struct LoadedScene<'a> {
     pub(super) scene: &'a PaperScene,
     pub(super) cloud: PointCloud,
     pub(super) camera: Camera,
@@ -187,12 +187,12 @@ fn outcome<T>(result: Result<T, Error>) -> Result<Outcome<T>, Failure> {
 /// Renders frames of a scene and returns the medians of their times.
 pub(super) fn time(
     renderers: &mut Renderers,
-    loaded: &Loaded<'_>,
+    loaded: &LoadedScene<'_>,
     method: Method,
     settings: &Settings,
     frames: usize,
 ) -> Result<Outcome<Timing>, Failure> {
-    let Loaded { scene, cloud, camera } = loaded;
+    let LoadedScene { scene, cloud, camera } = loaded;
     let renderer = match renderers.of(method) {
         Ok(renderer) => renderer,
         Err(why) => return Ok(Err(why)),
@@ -238,8 +238,11 @@ pub(super) fn time(
 }
 
 /// Finds the kd-tree's best first radius.
-pub(super) fn first_radius(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Result<Outcome<FirstRadius>, Failure> {
-    let Loaded { scene, cloud, camera } = loaded;
+pub(super) fn first_radius(
+    renderers: &mut Renderers,
+    loaded: &LoadedScene<'_>,
+) -> Result<Outcome<FirstRadius>, Failure> {
+    let LoadedScene { scene, cloud, camera } = loaded;
     let renderer = match renderers.of(Method::KdTree) {
         Ok(renderer) => renderer,
         Err(why) => return Ok(Err(why)),
@@ -251,22 +254,22 @@ pub(super) fn first_radius(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Re
 
 /// Whether a pass builds the search structure.
 fn is_build(time: &PassTime) -> bool {
-    time.pass.starts_with(BUILD)
+    time.pass.starts_with(TREE_BUILD_PREFIX)
 }
 
 /// True k-radii among the visible points and among all points of a cloud.
 #[derive(Debug)]
-pub(super) struct Exact {
+pub(super) struct ExactRadii {
     on_screen: Vec<f32>,
     in_space: Vec<f32>,
     /// Indices in the cloud of the points of `on_screen`.
     visible: Vec<u32>,
 }
 
-impl Exact {
+impl ExactRadii {
     /// Computes the radii with a kd-tree of the visible points and one of all points.
-    pub(super) fn new(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Result<Self, Failure> {
-        let Loaded { scene, cloud, camera } = loaded;
+    pub(super) fn new(renderers: &mut Renderers, loaded: &LoadedScene<'_>) -> Result<Self, Failure> {
+        let LoadedScene { scene, cloud, camera } = loaded;
         let settings = settings(Method::GridCpu, f32::NAN, K, false);
         renderers.cpu.render(cloud, camera, scene.size, &settings).map_err(render_failure)?;
         let mut visible: Vec<u32> =
@@ -294,12 +297,12 @@ pub(super) fn iterations(left: &[u32]) -> usize {
 /// Compares an engine's k-radii with exact ones.
 pub(super) fn accuracy(
     renderers: &mut Renderers,
-    loaded: &Loaded<'_>,
+    loaded: &LoadedScene<'_>,
     method: Method,
     first_radius: f32,
-    exact: &Exact,
+    exact: &ExactRadii,
 ) -> Result<Outcome<Accuracy>, Failure> {
-    let Loaded { scene, cloud, camera } = loaded;
+    let LoadedScene { scene, cloud, camera } = loaded;
     let renderer = match renderers.of(method) {
         Ok(renderer) => renderer,
         Err(why) => return Ok(Err(why)),
@@ -311,7 +314,7 @@ pub(super) fn accuracy(
     };
     let left = renderer.convergence().map_err(render_failure)?;
     let surfels = renderer.surfels().map_err(render_failure)?;
-    let same = |found: f32, exact: f32| (found - exact).abs() <= SAME * exact;
+    let same = |found: f32, exact: f32| (found - exact).abs() <= MAX_RADIUS_DIFFERENCE * exact;
     let [mut on_screen, mut in_space] = [0; 2];
     for surfel in &surfels {
         let seen = exact.visible.binary_search(&surfel.point).map(|at| exact.on_screen[at]);
@@ -332,7 +335,7 @@ pub(super) fn accuracy(
 
 /// Measures kiddo, if the program was built with it.
 #[cfg(feature = "kiddo")]
-pub(super) fn kiddo(loaded: &Loaded<'_>, exact: &Exact) -> Outcome<KiddoTimes> {
+pub(super) fn kiddo(loaded: &LoadedScene<'_>, exact: &ExactRadii) -> Outcome<KiddoTimes> {
     let positions = loaded.cloud.positions();
     let visible: Vec<[f32; 3]> = exact.visible.iter().map(|&point| positions[point as usize]).collect();
     Ok(KiddoTimes { visible_ms: kiddo_ms(&visible), all_ms: kiddo_ms(positions) })
@@ -353,20 +356,20 @@ fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
 
 /// Returns how to build with kiddo.
 #[cfg(not(feature = "kiddo"))]
-pub(super) fn kiddo(_: &Loaded<'_>, _: &Exact) -> Outcome<KiddoTimes> {
+pub(super) fn kiddo(_: &LoadedScene<'_>, _: &ExactRadii) -> Outcome<KiddoTimes> {
     Err("this program was built without kiddo; build it with --features kiddo".into())
 }
 
 /// Fraction of the pixels that look different with grid culling.
-pub(super) fn culling_difference(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Result<f64, Failure> {
-    let Loaded { scene, cloud, camera } = loaded;
+pub(super) fn culling_difference(renderers: &mut Renderers, loaded: &LoadedScene<'_>) -> Result<f64, Failure> {
+    let LoadedScene { scene, cloud, camera } = loaded;
     let mut images: Vec<Image> = Vec::new();
     for culled in [false, true] {
         let settings = settings(Method::GridCpu, f32::NAN, K, culled);
         let frame = renderers.cpu.render(cloud, camera, scene.size, &settings).map_err(render_failure)?;
         images.push(frame.image.clone());
     }
-    let differs = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > SEEN);
+    let differs = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > MAX_LEVEL_DIFFERENCE);
     let pixels = &images[0].pixels;
     Ok(pixels.iter().zip(&images[1].pixels).filter(differs).count() as f64 / pixels.len() as f64)
 }

@@ -20,7 +20,7 @@ use autosplats_cloud::Progress as _;
 use self::figures::{NormalError, Radii};
 use self::journal::Journal;
 use self::measure::{
-    Accuracy, Exact, FirstRadius, K, KiddoTimes, Loaded, Method, Outcome, Renderers, Timing, accuracy,
+    Accuracy, ExactRadii, FirstRadius, K, KiddoTimes, LoadedScene, Method, Outcome, Renderers, Timing, accuracy,
     culling_difference, kiddo, settings, time,
 };
 use self::report::Report;
@@ -186,7 +186,7 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
             continue;
         }
         let (cloud, camera) = scene.load(run.quiet)?;
-        let loaded = Loaded { scene, cloud, camera };
+        let loaded = LoadedScene { scene, cloud, camera };
         let mut exact = None;
         for task in tasks {
             let bar = Bar::new(&format!("{}: {}", scene.name, task.describe()), run.quiet);
@@ -204,7 +204,7 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
             let first_radius = radius.map_or(f32::NAN, |found| found.radius);
             let mut exact_radii = |renderers: &mut Renderers| match exact.take() {
                 Some(exact) => Ok(exact),
-                None => Exact::new(renderers, &loaded),
+                None => ExactRadii::new(renderers, &loaded),
             };
             match task {
                 Task::FirstRadius => {

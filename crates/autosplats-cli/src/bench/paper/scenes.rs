@@ -19,8 +19,8 @@ const QUICK_SIZE: [u32; 2] = [440, 225];
 const FOV_DEG: f64 = 30.0;
 const HERD_FOV_DEG: f64 = 17.0;
 /// Number of horses in the herd and in one of its rows.
-const HORSES: usize = 24;
-const ROW: usize = 8;
+const HORSE_COUNT: usize = 24;
+const HORSES_PER_ROW: usize = 8;
 
 /// A scene of Table 1.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub(super) struct PaperScene {
     points: usize,
     /// Width and height of the pictures in pixels.
     pub(super) size: [u32; 2],
-    source: Source,
+    source: SceneSource,
 }
 
 /// A scene's figures in Table 1 of the paper, in milliseconds: GeForce GTX 580, k = 10. `None` where the table has no
@@ -48,7 +48,7 @@ pub(super) struct PaperFigures {
 }
 
 #[derive(Clone, Debug)]
-enum Source {
+enum SceneSource {
     /// A built-in scene by this name.
     Generated(&'static str),
     /// All points of a file, seen from its front.
@@ -74,19 +74,21 @@ impl PaperScene {
             "bunny" => (
                 figures("36K", "34K", Some(14.0), 9.0, None),
                 [35_947, 8_000],
-                bunny.map_or(Source::Generated("figure"), |path| Source::File(path.into())),
+                bunny.map_or(SceneSource::Generated("figure"), |path| SceneSource::File(path.into())),
             ),
             "imperia" => {
-                (figures("546K", "291K", Some(95.0), 37.0, None), [546_000, 20_000], Source::Generated("statue"))
+                (figures("546K", "291K", Some(95.0), 37.0, None), [546_000, 20_000], SceneSource::Generated("statue"))
             }
             "horses" => (
                 figures("1M", "690K", Some(169.0), 117.0, Some(71.0)),
                 [1_000_000, 30_000],
-                gallop.map_or(Source::Generated("herd"), |path| Source::Gallop(path.into())),
+                gallop.map_or(SceneSource::Generated("herd"), |path| SceneSource::Gallop(path.into())),
             ),
-            _ => {
-                (figures("10M", "1.3M", None, 264.0, Some(123.0)), [10_000_000, 60_000], Source::Generated("cathedral"))
-            }
+            _ => (
+                figures("10M", "1.3M", None, 264.0, Some(123.0)),
+                [10_000_000, 60_000],
+                SceneSource::Generated("cathedral"),
+            ),
         };
         let [width, height] = if quick { QUICK_SIZE } else { SIZE };
         // The paper shows the statue in portrait format.
@@ -97,10 +99,14 @@ impl PaperScene {
     /// Origin of the points, for the report.
     pub(super) fn origin(&self) -> String {
         match &self.source {
-            Source::Generated(scene) => format!("generated substitute, `scene:{scene}:{}`", self.points),
-            Source::File(path) => format!("all points of `{}`", file_name(path)),
-            Source::Gallop(folder) => {
-                format!("{HORSES} moments of `{}`, {} points sampled on the surfaces", file_name(folder), self.points)
+            SceneSource::Generated(scene) => format!("generated substitute, `scene:{scene}:{}`", self.points),
+            SceneSource::File(path) => format!("all points of `{}`", file_name(path)),
+            SceneSource::Gallop(folder) => {
+                format!(
+                    "{HORSE_COUNT} moments of `{}`, {} points sampled on the surfaces",
+                    file_name(folder),
+                    self.points
+                )
             }
         }
     }
@@ -108,11 +114,11 @@ impl PaperScene {
     /// Key of the scene in the journal.
     pub(super) fn key(&self) -> String {
         let source = match &self.source {
-            Source::Generated(scene) => format!("{scene}:{}", self.points),
-            Source::File(path) => {
+            SceneSource::Generated(scene) => format!("{scene}:{}", self.points),
+            SceneSource::File(path) => {
                 format!("{} of {} bytes", file_name(path), path.metadata().map_or(0, |metadata| metadata.len()))
             }
-            Source::Gallop(folder) => format!("{}:{}", file_name(folder), self.points),
+            SceneSource::Gallop(folder) => format!("{}:{}", file_name(folder), self.points),
         };
         let [width, height] = self.size;
         format!("{} ({source}, {width}x{height})", self.name)
@@ -121,21 +127,21 @@ impl PaperScene {
     /// File or folder of the scene, checked before the work begins.
     pub(super) fn file(&self) -> Option<&Path> {
         match &self.source {
-            Source::Generated(_) => None,
-            Source::File(path) | Source::Gallop(path) => Some(path),
+            SceneSource::Generated(_) => None,
+            SceneSource::File(path) | SceneSource::Gallop(path) => Some(path),
         }
     }
 
     /// The points, and the camera that shows them.
     pub(super) fn load(&self, quiet: bool) -> Result<(PointCloud, Camera), Failure> {
         match &self.source {
-            Source::Generated(scene) => generated(&format!("{scene}:{}", self.points), quiet),
-            Source::File(path) => {
+            SceneSource::Generated(scene) => generated(&format!("{scene}:{}", self.points), quiet),
+            SceneSource::File(path) => {
                 let bar = Bar::on_file("reading", path, quiet);
                 let cloud = read_with(path, &ReadOptions::default(), &bar).map_err(read_failure)?;
                 self.fitted(cloud, ViewDirection::Front)
             }
-            Source::Gallop(folder) => {
+            SceneSource::Gallop(folder) => {
                 let (cloud, camera) = self.fitted(herd(folder, self.points, quiet)?, ViewDirection::Iso)?;
                 // The herd extends beyond the picture, which matches the paper's pixel counts.
                 Ok((cloud, Camera { projection: Projection::PerspectiveFovDeg(HERD_FOV_DEG), ..camera }))
@@ -162,7 +168,7 @@ pub(super) fn generated(name: &str, quiet: bool) -> Result<(PointCloud, Camera),
     Ok((inputs.read(quiet)?, scene_camera(scene)))
 }
 
-/// Horses in rows of `ROW` at moments of one gallop, with `count` sampled points in all.
+/// Horses in rows of `HORSES_PER_ROW` at moments of one gallop, with `count` sampled points in all.
 fn herd(folder: &Path, count: usize, quiet: bool) -> Result<PointCloud, Failure> {
     let unreadable = |error: std::io::Error| Failure::new(Exit::Input, format!("{}: {error}", folder.display()));
     let mut files = Vec::new();
@@ -178,15 +184,15 @@ fn herd(folder: &Path, count: usize, quiet: bool) -> Result<PointCloud, Failure>
     // The first file has the triangles of all.
     let triangles = read_mesh(&files[0], &options, &()).map_err(read_failure)?.triangles;
     let mut horses = Vec::new();
-    for horse in 0..HORSES {
-        autosplats_cloud::Progress::report(&bar, horse as f32 / HORSES as f32);
+    for horse in 0..HORSE_COUNT {
+        autosplats_cloud::Progress::report(&bar, horse as f32 / HORSE_COUNT as f32);
         // Files seven frames apart show neighbours at different moments.
         let file = &files[horse * 7 % files.len()];
         let cloud = read_with(file, &options, &()).map_err(read_failure)?;
         let mesh = Contents { cloud, triangles: triangles.clone() };
-        let share = count / HORSES + usize::from(horse < count % HORSES);
+        let share = count / HORSE_COUNT + usize::from(horse < count % HORSE_COUNT);
         let points = sample_surface(&mesh, share, horse as u64, &()).map_err(read_failure)?;
-        let [across, along] = [(horse % ROW) as f64, (horse / ROW) as f64];
+        let [across, along] = [(horse % HORSES_PER_ROW) as f64, (horse / HORSES_PER_ROW) as f64];
         // The horses run along z; rows are staggered.
         let place = DVec3::new(0.95 * across + 0.45 * along, 0.0, -2.1 * along - 0.35 * (2.4 * across).sin());
         horses.push((points, DMat4::from_translation(place)));

@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 
 /// Substitute for ffmpeg: a script that stores its arguments and its input.
 #[cfg(unix)]
-pub(crate) const KEEP: &str = "echo \"$@\" > words; for last; do :; done; cat > \"$last\"";
+pub(crate) const STORE_INPUT: &str = "echo \"$@\" > words; for last; do :; done; cat > \"$last\"";
 
 /// Number of evenly spread points on the unit sphere.
 pub(crate) const SPHERE_POINTS: usize = 6000;

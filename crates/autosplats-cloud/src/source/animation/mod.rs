@@ -22,7 +22,7 @@ use super::scanner::{Scanned, Scanner};
 use crate::{Axes, Contents, Error, PointCloud, Progress, ReadOptions, Scene, Timeline};
 
 /// Number of points sampled on a scene to find its size.
-const PLACED_BY: usize = 20_000;
+const EXTENT_SAMPLES: usize = 20_000;
 
 /// Random access to the frames of an animation.
 pub(crate) trait Frames: Send + Sync {
@@ -113,7 +113,7 @@ impl Animation {
     pub fn scanners(&self, count: usize, progress: &dyn Progress) -> Result<Vec<Scanner>, Error> {
         let surface = self.frames.surface(0, progress)?;
         let cloud = match &surface {
-            Surface::Scene(scene) => &still::sample(scene, PLACED_BY, progress)?,
+            Surface::Scene(scene) => &still::sample(scene, EXTENT_SAMPLES, progress)?,
             Surface::Mesh(mesh) => &mesh.cloud,
         };
         let places = (0..cloud.len()).map(|index| cloud.world_position(index)).filter(|place| place.is_finite());

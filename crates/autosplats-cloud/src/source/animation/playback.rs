@@ -14,7 +14,7 @@ use super::Frames;
 use crate::{Error, Next, PointCloud, Progress, Statistics, Stream, Timeline, Update};
 
 /// Time between two checks for cancellation.
-const LOOK: Duration = Duration::from_millis(20);
+const CHECK_INTERVAL: Duration = Duration::from_millis(20);
 
 /// An [`Animation`](crate::Animation) that is played. While frames follow each other, the next one is read ahead.
 ///
@@ -25,7 +25,7 @@ pub struct Playback {
     next: usize,
     /// Updates of the last frame that nobody has taken yet.
     ready: VecDeque<Update>,
-    ahead: Option<Ahead>,
+    ahead: Option<ReadAhead>,
     /// The frame read last.
     last: Option<usize>,
     failed: BTreeSet<usize>,
@@ -46,7 +46,7 @@ impl Playback {
             return read;
         }
         // Notes about one frame hold for all, so only the first frame passes them on.
-        self.frames.read(frame, &Quiet { progress, notes: self.last.is_none() })
+        self.frames.read(frame, &FrameProgress { progress, notes: self.last.is_none() })
     }
 }
 
@@ -93,7 +93,7 @@ impl Stream for Playback {
             // Neighbouring frames are not read ahead while a caller seeks.
             if in_a_row {
                 let following = (frame + 1) % self.frames.timeline().len();
-                self.ahead = Ahead::start(&self.frames, following);
+                self.ahead = ReadAhead::start(&self.frames, following);
             }
         }
         let Some(update) = self.ready.pop_front() else { return Ok(Next::Nothing) };
@@ -106,19 +106,19 @@ impl Stream for Playback {
     }
 }
 
-/// A frame that a thread reads ahead. Dropping `Ahead` cancels the thread.
-struct Ahead {
+/// A frame that a thread reads ahead. Dropping `ReadAhead` cancels the thread.
+struct ReadAhead {
     frame: usize,
     read: Receiver<Result<Vec<Arc<PointCloud>>, Error>>,
     given_up: Arc<AtomicBool>,
 }
 
-impl Ahead {
+impl ReadAhead {
     /// Returns `None` if no thread can be started.
     fn start(frames: &Arc<dyn Frames>, frame: usize) -> Option<Self> {
         let (sender, read) = sync_channel(1);
         let given_up = Arc::new(AtomicBool::new(false));
-        let (frames, stop) = (Arc::clone(frames), Behind(Arc::clone(&given_up)));
+        let (frames, stop) = (Arc::clone(frames), ReadAheadProgress(Arc::clone(&given_up)));
         let work = move || {
             let _ = sender.send(frames.read(frame, &stop));
         };
@@ -129,7 +129,7 @@ impl Ahead {
     /// Waits for the frame. Returns `None` if the thread has panicked.
     fn wait(self, progress: &dyn Progress) -> Option<Result<Vec<Arc<PointCloud>>, Error>> {
         loop {
-            match self.read.recv_timeout(LOOK) {
+            match self.read.recv_timeout(CHECK_INTERVAL) {
                 Ok(read) => return Some(read),
                 Err(RecvTimeoutError::Timeout) if progress.cancelled() => return Some(Err(Error::Cancelled)),
                 Err(RecvTimeoutError::Timeout) => {}
@@ -139,16 +139,16 @@ impl Ahead {
     }
 }
 
-impl Drop for Ahead {
+impl Drop for ReadAhead {
     fn drop(&mut self) {
         self.given_up.store(true, Ordering::Relaxed);
     }
 }
 
 /// Progress of a frame that is read ahead: reports go nowhere.
-struct Behind(Arc<AtomicBool>);
+struct ReadAheadProgress(Arc<AtomicBool>);
 
-impl Progress for Behind {
+impl Progress for ReadAheadProgress {
     fn report(&self, _: f32) {}
 
     fn cancelled(&self) -> bool {
@@ -157,12 +157,12 @@ impl Progress for Behind {
 }
 
 /// Passes on reports, and notes if `notes` is set, but no previews: the shown points stay until the frame is complete.
-struct Quiet<'a> {
+struct FrameProgress<'a> {
     progress: &'a dyn Progress,
     notes: bool,
 }
 
-impl Progress for Quiet<'_> {
+impl Progress for FrameProgress<'_> {
     fn report(&self, fraction: f32) {
         self.progress.report(fraction);
     }

@@ -27,8 +27,8 @@ impl Sampled {
 
     fn on(&self, mesh: &Contents, progress: &dyn Progress) -> Result<PointCloud, Error> {
         match &self.first {
-            Some((strewn, first)) if strewn.fits(mesh.cloud.len()) && first.triangles == mesh.triangles => {
-                strewn.on(&mesh.cloud, progress)
+            Some((samples, first)) if samples.fits(mesh.cloud.len()) && first.triangles == mesh.triangles => {
+                samples.on(&mesh.cloud, progress)
             }
             _ => SurfaceSamples::new(mesh, self.count, SEED, progress)?.on(&mesh.cloud, progress),
         }

@@ -6,7 +6,7 @@ use super::{Frames, Surface};
 use crate::{Contents, Error, PointCloud, Progress, Scene, Timeline};
 
 /// Length of the timeline of a static scene, in seconds.
-const STILL: f64 = 10.0;
+const STATIC_SECONDS: f64 = 10.0;
 
 /// A built-in scene.
 pub(super) struct MovingScene {
@@ -19,7 +19,7 @@ pub(super) struct MovingScene {
 
 impl MovingScene {
     pub(super) fn new(scene: &Scene, count: usize, fps: f64) -> Result<Self, Error> {
-        let seconds = if scene.is_animated() { Scene::PERIOD } else { STILL };
+        let seconds = if scene.is_animated() { Scene::PERIOD } else { STATIC_SECONDS };
         let frames = (seconds * fps).round().max(1.0) as usize;
         // Rejects an invalid rate before frames are counted.
         Timeline::even(0, fps)?;

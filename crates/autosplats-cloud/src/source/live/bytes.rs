@@ -14,12 +14,12 @@ use crate::{
 };
 
 /// Bytes read at a time.
-const PIECE: usize = 1 << 16;
+const READ_BYTES: usize = 1 << 16;
 
 /// Reads until the input ends or the mailbox is abandoned.
 pub(super) fn read(mut input: impl Read, name: &Path, options: &LiveOptions, mailbox: &Mailbox) {
     let mut framing = Framing::new(options.max_frame_bytes);
-    let mut piece = vec![0; PIECE];
+    let mut piece = vec![0; READ_BYTES];
     loop {
         let len = match input.read(&mut piece) {
             Ok(len) => len,
@@ -51,12 +51,14 @@ fn deliver(found: Found, name: &Path, options: &LiveOptions, mailbox: &Mailbox) 
     let refused = |byte: u64, what| Error::Malformed { path: name.into(), place: format!("byte {byte}"), what };
     let error = match found {
         Found::Refused(byte, what) => refused(byte, what),
-        Found::File(byte, bytes) => match guarded(name, || read_bytes(name, &bytes, &options.read, &Until(mailbox))) {
-            Ok(cloud) => return mailbox.put(Update { channel: 0, stamp: now(), cloud: Arc::new(cloud) }),
-            // A position within a frame needs the offset of the frame.
-            Err(Error::Malformed { place, what, .. }) => refused(byte, format!("in a frame, {place}: {what}")),
-            Err(error) => error,
-        },
+        Found::File(byte, bytes) => {
+            match guarded(name, || read_bytes(name, &bytes, &options.read, &UntilAbandoned(mailbox))) {
+                Ok(cloud) => return mailbox.put(Update { channel: 0, stamp: now(), cloud: Arc::new(cloud) }),
+                // A position within a frame needs the offset of the frame.
+                Err(Error::Malformed { place, what, .. }) => refused(byte, format!("in a frame, {place}: {what}")),
+                Err(error) => error,
+            }
+        }
     };
     if !mailbox.is_abandoned() {
         mailbox.refuse(error);
@@ -64,9 +66,9 @@ fn deliver(found: Found, name: &Path, options: &LiveOptions, mailbox: &Mailbox) 
 }
 
 /// Cancels once the mailbox is abandoned.
-pub(super) struct Until<'a>(pub(super) &'a Mailbox);
+pub(super) struct UntilAbandoned<'a>(pub(super) &'a Mailbox);
 
-impl Progress for Until<'_> {
+impl Progress for UntilAbandoned<'_> {
     fn report(&self, _: f32) {}
 
     fn cancelled(&self) -> bool {

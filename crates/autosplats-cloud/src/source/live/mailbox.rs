@@ -9,7 +9,7 @@ use std::{
 use crate::{Error, Next, Progress, Statistics, Update};
 
 /// Time between two checks for cancellation.
-const LOOK: Duration = Duration::from_millis(20);
+const CHECK_INTERVAL: Duration = Duration::from_millis(20);
 
 /// The newest update of each channel.
 pub(super) struct Mailbox {
@@ -111,7 +111,7 @@ impl Mailbox {
             if progress.cancelled() {
                 return Err(Error::Cancelled);
             }
-            let waited = self.changed.wait_timeout(state, left.min(LOOK));
+            let waited = self.changed.wait_timeout(state, left.min(CHECK_INTERVAL));
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }

@@ -26,7 +26,7 @@ pub(super) struct Layout<'a> {
 }
 
 /// Smallest size of a field in bytes: length of the name, offset, type and count.
-const LEAST_FIELD: usize = 13;
+const MIN_FIELD_BYTES: usize = 13;
 
 impl<'a> Layout<'a> {
     pub(super) fn parse(bytes: &'a [u8], encoding: Encoding) -> Result<Self, Fault> {
@@ -35,7 +35,7 @@ impl<'a> Layout<'a> {
         let size_at = wire.at();
         let (height, width) = (wire.u32("the size")? as usize, wire.u32("the size")? as usize);
         let fields = wire.clone();
-        let number = wire.list(LEAST_FIELD, "fields")?;
+        let number = wire.list(MIN_FIELD_BYTES, "fields")?;
         if number > MAX_COLUMNS {
             return Err(Fault::new(fields.at(), format!("{number} fields a point; at most {MAX_COLUMNS}")));
         }
@@ -99,7 +99,7 @@ impl<'a> Layout<'a> {
 }
 
 /// Maximum length of a field's name in bytes.
-const MAX_NAME: usize = 1024;
+const MAX_NAME_BYTES: usize = 1024;
 
 /// A field as the message describes it.
 struct Field<'a> {
@@ -114,7 +114,7 @@ impl<'a> Field<'a> {
     fn parse(wire: &mut Wire<'a>) -> Result<Self, Fault> {
         let at = wire.at();
         let name = wire.string("a field's name")?;
-        if name.len() > MAX_NAME {
+        if name.len() > MAX_NAME_BYTES {
             return Err(Fault::new(at, format!("a field's name of {} bytes", name.len())));
         }
         let offset = wire.u32("a field's offset")? as usize;
@@ -146,7 +146,7 @@ impl<'a> Field<'a> {
 /// The columns of the fields. Fails if a field exceeds a point of `step` bytes, or if fields overlap too much.
 fn columns(mut fields: Wire<'_>, number: usize, step: usize) -> Result<Vec<Column>, Fault> {
     let fields_at = fields.at();
-    fields.list(LEAST_FIELD, "fields")?;
+    fields.list(MIN_FIELD_BYTES, "fields")?;
     let mut columns = Vec::new();
     for _ in 0..number {
         let field = Field::parse(&mut fields)?;

@@ -34,7 +34,7 @@ pub struct Message {
 }
 
 /// Names of map frames, whose origin is not the position of a sensor.
-const MAPS: [&str; 5] = ["map", "odom", "world", "earth", "utm"];
+const MAP_FRAMES: [&str; 5] = ["map", "odom", "world", "earth", "utm"];
 
 /// Converts a PointCloud2 message of any layout and byte order into a cloud. Rows of an image follow each other.
 ///
@@ -63,7 +63,7 @@ pub fn decode(name: &Path, bytes: &[u8], encoding: Encoding, options: &ReadOptio
     let no_returns = take_out_no_returns(&mut cloud, |_| !options.keep_no_returns);
     let axes = if frame_id.contains("optical") { Axes::Camera } else { Axes::ZUp };
     let mut cloud = cloud.with_axes(axes);
-    if !MAPS.contains(&&*frame_id.to_lowercase()) && !cloud.is_empty() {
+    if !MAP_FRAMES.contains(&&*frame_id.to_lowercase()) && !cloud.is_empty() {
         let points = 0..cloud.len();
         let name = (!frame_id.is_empty()).then(|| frame_id.clone());
         cloud = cloud.with_scans(vec![Scan { name, world_from_sensor: DMat4::IDENTITY, points }]);

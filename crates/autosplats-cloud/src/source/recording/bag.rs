@@ -22,7 +22,7 @@ mod op {
 }
 
 /// Bytes of an index entry: the time in two numbers, and the offset.
-const ENTRY: usize = 12;
+const INDEX_ENTRY_BYTES: usize = 12;
 
 impl Bag {
     pub(super) fn record<'a>(&mut self, bytes: &'a [u8], at: usize) -> Result<(Record<'a>, usize), Fault> {
@@ -57,7 +57,7 @@ impl Bag {
             }
             op::MESSAGE => Record::Message(connection()?, header.number(b"time").map_or(0, time), data),
             op::INDEX => {
-                let entries = data.chunks_exact(ENTRY).filter_map(|entry| {
+                let entries = data.chunks_exact(INDEX_ENTRY_BYTES).filter_map(|entry| {
                     let (stamp, place) = entry.split_first_chunk::<8>()?;
                     Some((time(*stamp), u32::from_le_bytes(*place.first_chunk()?) as usize))
                 });

@@ -65,10 +65,10 @@ struct Zstd<'a> {
 }
 
 /// Maximum window of a frame in bytes. Large frames may ask for more.
-const WINDOW: u64 = 16 << 20;
+const MAX_WINDOW_BYTES: u64 = 16 << 20;
 
 /// Bytes decompressed at once.
-const STEP: usize = 1 << 17;
+const UNPACK_STEP_BYTES: usize = 1 << 17;
 
 impl Read for Zstd<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
@@ -76,7 +76,7 @@ impl Read for Zstd<'_> {
         loop {
             if let Some(mut frame) = self.frame.take() {
                 // A frame that is cut off loses at most this many bytes.
-                let len = buffer.len().min(STEP);
+                let len = buffer.len().min(UNPACK_STEP_BYTES);
                 let read = frame.read(&mut buffer[..len])?;
                 if read > 0 || buffer.is_empty() {
                     self.frame = Some(frame);
@@ -87,7 +87,7 @@ impl Read for Zstd<'_> {
             if self.data.is_empty() {
                 return Ok(0);
             }
-            let most = WINDOW.max((self.data.len() as u64) << 14);
+            let most = MAX_WINDOW_BYTES.max((self.data.len() as u64) << 14);
             let frame = StreamingDecoder::new_with_max_window_size(self.data, most).map_err(std::io::Error::other)?;
             self.frame = Some(Box::new(frame));
         }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     chunk::unpack,
-    index::{Container, Index, Place, Record},
+    index::{Container, Index, MessagePosition, Record},
 };
 use crate::{
     Error, Progress, ReadOptions,
@@ -26,8 +26,8 @@ pub(super) struct File {
 
 enum Unpacked {
     /// Not compressed: the records lie in the file.
-    There,
-    Made(Vec<u8>),
+    InFile,
+    Decompressed(Vec<u8>),
 }
 
 impl File {
@@ -47,8 +47,8 @@ impl File {
         let Some((mut container, first)) = Container::of(&bytes) else {
             return Err(if bytes.is_empty() {
                 job.malformed("byte 0", "the file is empty; copy it again")
-            } else if bytes.starts_with(SQLITE) {
-                job.unsupported(CONVERT)
+            } else if bytes.starts_with(SQLITE_MAGIC) {
+                job.unsupported(SQLITE_ADVICE)
             } else if bytes.starts_with(b"#ROSBAG") {
                 job.unsupported(
                     "bags older than version 2.0 are not supported; convert this one with 'rosbag fix' or 'rosbag reindex'",
@@ -69,7 +69,7 @@ impl File {
     }
 
     /// The bytes of a message.
-    pub(super) fn message(&mut self, place: &Place) -> Result<&[u8], Error> {
+    pub(super) fn message(&mut self, place: &MessagePosition) -> Result<&[u8], Error> {
         let Self { path, bytes, index, container, unpacked } = self;
         let offset = place.chunk.map_or(place.at, |chunk| index.chunks[chunk].data.start);
         let malformed =
@@ -82,15 +82,15 @@ impl File {
                     // Frees the memory of the last chunk before the next one is unpacked.
                     *unpacked = None;
                     let content = unpack(bytes, chunk).map(|content| match content {
-                        std::borrow::Cow::Borrowed(_) => Unpacked::There,
-                        std::borrow::Cow::Owned(made) => Unpacked::Made(made),
+                        std::borrow::Cow::Borrowed(_) => Unpacked::InFile,
+                        std::borrow::Cow::Owned(made) => Unpacked::Decompressed(made),
                     });
                     *unpacked = Some((number, content));
                 }
                 match &unpacked.as_ref().map(|(_, content)| content) {
-                    Some(Ok(Unpacked::Made(made))) => made,
+                    Some(Ok(Unpacked::Decompressed(made))) => made,
                     Some(Err(what)) => return Err(malformed(&format!("a chunk cannot be read: {what}"))),
-                    Some(Ok(Unpacked::There)) | None => &bytes[chunk.data.clone()],
+                    Some(Ok(Unpacked::InFile)) | None => &bytes[chunk.data.clone()],
                 }
             }
         };
@@ -102,14 +102,14 @@ impl File {
     }
 
     /// Offset in the file of a message, or of the chunk that contains it.
-    pub(super) fn offset(&self, place: &Place) -> usize {
+    pub(super) fn offset(&self, place: &MessagePosition) -> usize {
         place.chunk.map_or(place.at, |chunk| self.index.chunks[chunk].data.start)
     }
 }
 
-/// First bytes of an SQLite database. `CONVERT` is the advice for users of such files.
-const SQLITE: &[u8] = b"SQLite format 3\0";
-const CONVERT: &str =
+/// First bytes of an SQLite database. `SQLITE_ADVICE` is the advice for users of such files.
+const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
+const SQLITE_ADVICE: &str =
     "ROS 2 bags in SQLite are not supported; convert this one to MCAP with 'ros2 bag convert' or 'mcap convert'";
 
 /// File that identifies the folder of a ROS 2 bag.
@@ -125,16 +125,16 @@ fn has_extension(path: &Path, extension: &str) -> bool {
 }
 
 /// The files of a recording, and messages about the files of a folder that cannot be opened.
-pub(super) struct Parts {
+pub(super) struct OpenedFiles {
     pub(super) files: Vec<File>,
     /// One line per file.
     pub(super) missing: Vec<String>,
 }
 
 /// Opens a file, or all files of a folder in order. Files of a folder that cannot be opened are left out.
-pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<Parts, Error> {
+pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<OpenedFiles, Error> {
     if !path.is_dir() {
-        return Ok(Parts { files: vec![File::open(path, progress)?], missing: Vec::new() });
+        return Ok(OpenedFiles { files: vec![File::open(path, progress)?], missing: Vec::new() });
     }
     let io = |source| Error::Io { path: path.into(), source };
     let mut parts = parts(&std::fs::read_to_string(path.join(METADATA)).unwrap_or_default());
@@ -162,7 +162,7 @@ pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<Parts, 
     }
     match first {
         Some(error) if files.is_empty() => Err(error),
-        _ => Ok(Parts { files, missing }),
+        _ => Ok(OpenedFiles { files, missing }),
     }
 }
 

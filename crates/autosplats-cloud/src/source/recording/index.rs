@@ -56,7 +56,7 @@ impl Topic {
 
 /// Position of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct MessagePosition {
     /// Time of recording in nanoseconds since 1970.
     pub(super) time: i64,
     pub(super) file: usize,
@@ -122,7 +122,7 @@ pub(super) struct Index {
     /// Topics by the numbers that messages use.
     pub(super) numbers: HashMap<u32, usize>,
     /// Messages of points and of transforms, in file order.
-    pub(super) messages: Vec<Place>,
+    pub(super) messages: Vec<MessagePosition>,
     pub(super) chunks: Vec<Chunk>,
     /// Times of the first and the last message.
     pub(super) times: Option<Range<i64>>,
@@ -131,7 +131,7 @@ pub(super) struct Index {
 }
 
 /// Number of records between two checks for cancellation.
-const BLOCK: usize = 1 << 12;
+const RECORDS_PER_CHECK: usize = 1 << 12;
 
 /// Maximum number of separately reported faults; further faults are only counted.
 const MAX_FAULTS: usize = 8;
@@ -144,12 +144,12 @@ impl Index {
         first: usize,
         progress: &dyn Progress,
     ) -> Result<Self, Error> {
-        let mut walk = Walk::default();
+        let mut walk = IndexBuilder::default();
         let mut at = first;
         let mut cut = None;
         let mut records = 0_usize;
         while at < bytes.len() && !walk.ended {
-            if records.is_multiple_of(BLOCK) {
+            if records.is_multiple_of(RECORDS_PER_CHECK) {
                 tick(progress, 0.5 * at as f32 / bytes.len() as f32)?;
             }
             records += 1;
@@ -182,7 +182,7 @@ impl Index {
 
 /// State of the walk through a file.
 #[derive(Default)]
-struct Walk {
+struct IndexBuilder {
     topics: HashMap<u32, Topic>,
     chunks: Vec<Chunk>,
     /// Messages of each chunk by the numbers of their topics, if index records follow the chunk.
@@ -193,7 +193,7 @@ struct Walk {
     ended: bool,
 }
 
-impl Walk {
+impl IndexBuilder {
     fn take(&mut self, record: Record<'_>, at: usize) {
         match record {
             Record::Topic(number, topic) => {
@@ -276,7 +276,7 @@ impl Walk {
             let times = index.times.get_or_insert(time..time);
             (times.start, times.end) = (times.start.min(time), times.end.max(time));
             if index.topics[topic].kind != Kind::Other {
-                index.messages.push(Place { time, file: 0, topic, chunk, at });
+                index.messages.push(MessagePosition { time, file: 0, topic, chunk, at });
             }
         }
         Ok(index)

@@ -28,10 +28,10 @@ mod op {
 }
 
 /// Bytes of a record's kind and length.
-const HEAD: usize = 9;
+const RECORD_HEAD_BYTES: usize = 9;
 
 /// Bytes of an index entry: time and offset.
-const ENTRY: usize = 16;
+const INDEX_ENTRY_BYTES: usize = 16;
 
 impl Mcap {
     pub(super) fn record<'a>(&mut self, bytes: &'a [u8], at: usize) -> Result<(Record<'a>, usize), Fault> {
@@ -39,14 +39,14 @@ impl Mcap {
         let kind = wire.u8("a record")?;
         let len = wire.u64("a record")?;
         let left = wire.left();
-        let end = usize::try_from(len).ok().filter(|len| *len <= left).map(|len| at + HEAD + len);
+        let end = usize::try_from(len).ok().filter(|len| *len <= left).map(|len| at + RECORD_HEAD_BYTES + len);
         let Some(end) = end else {
             let fault =
                 Fault::new(at, format!("a record of {len} bytes is cut off after {left}; everything after it is lost"));
-            return if kind == op::CHUNK { chunk(bytes, at + HEAD, Some(fault)) } else { Err(fault) };
+            return if kind == op::CHUNK { chunk(bytes, at + RECORD_HEAD_BYTES, Some(fault)) } else { Err(fault) };
         };
         let record = &bytes[..end];
-        let mut wire = Wire::plain(record, at + HEAD);
+        let mut wire = Wire::plain(record, at + RECORD_HEAD_BYTES);
         let record = match kind {
             0 => return Err(Fault::new(at, "there are zeros in place of records; everything after them is lost")),
             op::FOOTER => Record::End,
@@ -71,12 +71,12 @@ impl Mcap {
                 let data = wire.take(wire.left(), "a message")?;
                 Record::Message(number.into(), time, data)
             }
-            op::CHUNK => return chunk(&bytes[..end], at + HEAD, None),
+            op::CHUNK => return chunk(&bytes[..end], at + RECORD_HEAD_BYTES, None),
             op::MESSAGE_INDEX => {
                 let number = wire.u16("an index")?;
                 let mut entries = Wire::plain(wire.bytes("an index")?, 0);
-                let mut times = Vec::with_capacity(entries.left() / ENTRY);
-                while entries.left() >= ENTRY {
+                let mut times = Vec::with_capacity(entries.left() / INDEX_ENTRY_BYTES);
+                while entries.left() >= INDEX_ENTRY_BYTES {
                     let time = nanoseconds(entries.u64("an index")?);
                     let place = entries.u64("an index")?;
                     times.push((time, usize::try_from(place).unwrap_or(usize::MAX)));

@@ -24,8 +24,8 @@ pub use self::{
     summary::{RecordingSummary, RecordingTopic},
 };
 use self::{
-    files::{File, Parts, open_files},
-    index::{Kind, Place, Topic},
+    files::{File, OpenedFiles, open_files},
+    index::{Kind, MessagePosition, Topic},
     transforms::Transforms,
 };
 use super::{
@@ -59,13 +59,13 @@ pub struct Recording {
     /// Topics that are played, one per channel.
     channels: Vec<String>,
     /// Messages of points sorted by time, with their channels.
-    frames: Vec<(Place, usize)>,
+    frames: Vec<(MessagePosition, usize)>,
     timeline: Timeline,
     transforms: Transforms,
     position: usize,
     statistics: Statistics,
     /// Channels that have reported a note. Each channel reports only one.
-    told: Vec<bool>,
+    noted: Vec<bool>,
 }
 
 impl Recording {
@@ -92,12 +92,12 @@ impl Recording {
         progress: &dyn Progress,
     ) -> Result<Self, Error> {
         let files = vec![File::of_bytes(name, bytes, &indexing(progress))?];
-        Self::of(name, Parts { files, missing: Vec::new() }, options, progress)
+        Self::of(name, OpenedFiles { files, missing: Vec::new() }, options, progress)
     }
 
-    fn of(path: &Path, parts: Parts, options: &RecordingOptions, progress: &dyn Progress) -> Result<Self, Error> {
+    fn of(path: &Path, parts: OpenedFiles, options: &RecordingOptions, progress: &dyn Progress) -> Result<Self, Error> {
         let mut summary = RecordingSummary::of(&parts);
-        let Parts { mut files, missing } = parts;
+        let OpenedFiles { mut files, missing } = parts;
         let unsupported = |what: String| Error::Unsupported { path: path.into(), what: crate::error::message(&what) };
         let mut channels: Vec<String> = summary.points().map(|topic| topic.name.clone()).collect();
         channels.dedup();
@@ -122,36 +122,37 @@ impl Recording {
         for (number, File { index, .. }) in files.iter().enumerate() {
             let channel = |topic: &Topic| numbers.get(&*topic.name).copied().filter(|_| topic.kind == Kind::Points);
             let channels: Vec<Option<usize>> = index.topics.iter().map(channel).collect();
-            let own = index.messages.iter().map(|place| Place { file: number, ..*place });
+            let own = index.messages.iter().map(|place| MessagePosition { file: number, ..*place });
             frames.extend(own.filter_map(|place| Some((place, channels[place.topic]?))));
         }
         frames.sort_by_key(|(place, _)| place.time);
         let timeline = Timeline::new(frames.iter().map(|(place, _)| place.time).collect());
 
         let mut statistics = Statistics::default();
-        for told in missing {
-            progress.note(&told);
+        for noted in missing {
+            progress.note(&noted);
             statistics.refused += 1;
-            statistics.last_refusal = Some(told);
+            statistics.last_refusal = Some(noted);
         }
         for file in &files {
             for fault in &file.index.faults {
-                let told = format!("{}: {}", fault.place(), fault.what);
-                progress.note(&crate::error::message(&told));
+                let noted = format!("{}: {}", fault.place(), fault.what);
+                progress.note(&crate::error::message(&noted));
                 statistics.refused += 1;
                 statistics.last_refusal = Some(crate::error::message(&format!("{}: {told}", file.path.display())));
             }
         }
 
-        let mut transforms = Transforms::read(&files, &Part { whole: progress, start: INDEXING, len: 1.0 - INDEXING })?;
+        let mut transforms =
+            Transforms::read(&files, &Part { whole: progress, start: INDEXING_SHARE, len: 1.0 - INDEXING_SHARE })?;
         let sensors = sensors(&mut files, &frames, channels.len());
         transforms.choose(&sensors, options.frame.as_deref().map(frame_name)).map_err(&unsupported)?;
         summary.frames = transforms.frames(&sensors);
         summary.frame = transforms.target().map(str::to_owned);
         tick(progress, 1.0)?;
-        let told = vec![false; channels.len()];
+        let noted = vec![false; channels.len()];
         let options = options.clone();
-        Ok(Self { files, options, summary, channels, frames, timeline, transforms, position: 0, statistics, told })
+        Ok(Self { files, options, summary, channels, frames, timeline, transforms, position: 0, statistics, noted })
     }
 
     /// Summary of the recording.
@@ -166,20 +167,20 @@ impl Recording {
 }
 
 /// Coordinate frames of the channels' sensors, in order of channels, from the first readable message of each.
-fn sensors(files: &mut [File], frames: &[(Place, usize)], channels: usize) -> Vec<String> {
+fn sensors(files: &mut [File], frames: &[(MessagePosition, usize)], channels: usize) -> Vec<String> {
     let mut found: Vec<Result<String, usize>> = vec![Err(0); channels];
     let mut open = channels;
     for (place, channel) in frames {
         let Err(tried) = &mut found[*channel] else { continue };
         *tried += 1;
         let tried = *tried;
-        if tried > FIRST {
+        if tried > MAX_SENSOR_TRIALS {
             continue;
         }
         let file = &mut files[place.file];
         let encoding = file.index.topics[place.topic].encoding;
         let frame = encoding.and_then(|encoding| stamp_and_frame(file.message(place).ok()?, encoding));
-        open -= usize::from(frame.is_some() || tried == FIRST);
+        open -= usize::from(frame.is_some() || tried == MAX_SENSOR_TRIALS);
         if let Some((_, frame)) = frame {
             found[*channel] = Ok(frame);
         }
@@ -191,14 +192,14 @@ fn sensors(files: &mut [File], frames: &[(Place, usize)], channels: usize) -> Ve
 }
 
 /// Share of the progress of opening that indexing takes; reading transforms is the rest.
-const INDEXING: f32 = 0.5;
+const INDEXING_SHARE: f32 = 0.5;
 
 fn indexing(progress: &dyn Progress) -> Part<'_> {
-    Part { whole: progress, start: 0.0, len: INDEXING }
+    Part { whole: progress, start: 0.0, len: INDEXING_SHARE }
 }
 
 /// Maximum number of messages per topic that are tried to find the sensor's coordinate frame.
-const FIRST: usize = 8;
+const MAX_SENSOR_TRIALS: usize = 8;
 
 /// Summary of a recording, without reading points.
 ///

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Recording, index::Place};
+use super::{Recording, index::MessagePosition};
 use crate::{
     Error, Progress,
     source::{
@@ -53,7 +53,7 @@ impl Stream for Recording {
 }
 
 impl Recording {
-    fn update(&mut self, place: &Place, channel: usize, progress: &dyn Progress) -> Result<Update, Error> {
+    fn update(&mut self, place: &MessagePosition, channel: usize, progress: &dyn Progress) -> Result<Update, Error> {
         let topic = &self.channels[channel];
         let file = &mut self.files[place.file];
         let encoding = file.index.topics[place.topic].encoding.unwrap_or(point_cloud2::Encoding::Cdr);
@@ -68,17 +68,17 @@ impl Recording {
             })?;
         let stamp = if message.stamp == 0 { place.time } else { message.stamp };
         let mut cloud = message.cloud;
-        let told = &mut self.told[channel];
+        let noted = &mut self.noted[channel];
         if let Some(placement) = self.transforms.placement(&message.frame_id, stamp) {
             let missing;
             (cloud, missing) = placement.apply(cloud);
-            if let Some(missing) = missing.filter(|_| !*told) {
-                *told = true;
+            if let Some(missing) = missing.filter(|_| !*noted) {
+                *noted = true;
                 progress.note(&crate::error::message(&format!("{topic}: {missing}; its points stay as they are")));
             }
         }
-        if message.no_returns > 0 && !*told {
-            *told = true;
+        if message.no_returns > 0 && !*noted {
+            *noted = true;
             let (count, total) = (message.no_returns, message.no_returns + cloud.len());
             let note = format!("{topic}: dropped {count} of {total} points at (0, 0, 0), where nothing was measured");
             progress.note(&crate::error::message(&note));

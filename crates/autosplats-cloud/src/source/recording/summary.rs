@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use super::{
-    files::{File, Parts},
+    files::{File, OpenedFiles},
     index::{Kind, Topic},
 };
 
@@ -40,10 +40,10 @@ pub struct RecordingTopic {
 }
 
 /// Maximum number of topics listed in a message.
-const LISTED: usize = 20;
+const MAX_LISTED_TOPICS: usize = 20;
 
 impl RecordingSummary {
-    pub(super) fn of(Parts { files, missing }: &Parts) -> Self {
+    pub(super) fn of(OpenedFiles { files, missing }: &OpenedFiles) -> Self {
         let mut topics: BTreeMap<(&str, &str), RecordingTopic> = BTreeMap::new();
         let mut kinds: Vec<String> = Vec::new();
         let mut times = None;
@@ -87,8 +87,9 @@ impl RecordingSummary {
 
     /// All topics with their types, for a message.
     pub(super) fn topic_names(&self) -> String {
-        let names = self.topics.iter().take(LISTED).map(|topic| format!("{} ({})", topic.name, topic.type_name));
-        let more = self.topics.len().saturating_sub(LISTED);
+        let names =
+            self.topics.iter().take(MAX_LISTED_TOPICS).map(|topic| format!("{} ({})", topic.name, topic.type_name));
+        let more = self.topics.len().saturating_sub(MAX_LISTED_TOPICS);
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         if self.topics.is_empty() { "none".into() } else { names.collect::<Vec<_>>().join(", ") + &more }
     }

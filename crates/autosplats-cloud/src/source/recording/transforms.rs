@@ -11,14 +11,14 @@ use rayon::prelude::*;
 use super::{
     chunk::unpack,
     files::File,
-    index::{Container, Kind, Place, Record},
+    index::{Container, Kind, MessagePosition, Record},
 };
 use crate::{
     Axes, Error, PointCloud, Progress,
     error::message,
     progress::tick,
     source::{
-        clock::{Clock, Order},
+        clock::{Clock, StampOrder},
         point_cloud2::frame_name,
         wire::{Encoding, Fault, Wire, header},
     },
@@ -52,7 +52,7 @@ struct Pose {
 }
 
 /// One pose from a message.
-struct Sample {
+struct PoseSample {
     stamp: i64,
     parent: String,
     child: String,
@@ -60,29 +60,29 @@ struct Sample {
 }
 
 /// Smallest size of a transform in bytes: time, lengths of names, seven numbers.
-const LEAST_TRANSFORM: usize = 72;
+const MIN_TRANSFORM_BYTES: usize = 72;
 
 /// Number of chunks read in parallel.
-const BATCH: usize = 16;
+const CHUNKS_PER_BATCH: usize = 16;
 
 /// How long live poses are kept, by their stamps. Longer than the delay between measurement and arrival of points.
-const KEPT: Duration = Duration::from_secs(10);
+const POSE_HISTORY: Duration = Duration::from_secs(10);
 /// Maximum number of live poses kept per frame: a thousand per second.
-const MOST_POSES: usize = 10_000;
+const MAX_POSES: usize = 10_000;
 /// Maximum number of live frames; more do not occur on robots.
-const MOST_FRAMES: usize = 4096;
+const MAX_FRAMES: usize = 4096;
 
 /// Upper bound of a valid coordinate of a translation, in metres; far beyond any place on or around Earth.
-const FARTHEST: f64 = 1e12;
+const MAX_TRANSLATION_M: f64 = 1e12;
 
 impl Transforms {
     /// Reads all transforms of a recording.
     pub(super) fn read(files: &[File], progress: &dyn Progress) -> Result<Self, Error> {
         // Groups consecutive messages of one chunk, so that each chunk is unpacked once.
-        let mut runs: Vec<Vec<Place>> = Vec::new();
+        let mut runs: Vec<Vec<MessagePosition>> = Vec::new();
         for (number, File { index, .. }) in files.iter().enumerate() {
             let own = index.messages.iter().filter(|place| index.topics[place.topic].kind != Kind::Points);
-            for place in own.map(|place| Place { file: number, ..*place }) {
+            for place in own.map(|place| MessagePosition { file: number, ..*place }) {
                 match runs.last_mut() {
                     Some(run) if run[0].file == number && run[0].chunk == place.chunk => run.push(place),
                     _ => runs.push(vec![place]),
@@ -91,8 +91,8 @@ impl Transforms {
         }
         let mut transforms = Self::default();
         let mut lost: Option<String> = None;
-        for (number, batch) in runs.chunks(BATCH).enumerate() {
-            tick(progress, (number * BATCH) as f32 / runs.len() as f32)?;
+        for (number, batch) in runs.chunks(CHUNKS_PER_BATCH).enumerate() {
+            tick(progress, (number * CHUNKS_PER_BATCH) as f32 / runs.len() as f32)?;
             let samples: Vec<_> = batch.par_iter().map(|run| samples(&files[run[0].file], run)).collect();
             for outcome in samples {
                 match outcome {
@@ -113,7 +113,7 @@ impl Transforms {
         Ok(transforms)
     }
 
-    fn insert(&mut self, fixed: bool, Sample { stamp, parent, child, pose }: Sample) {
+    fn insert(&mut self, fixed: bool, PoseSample { stamp, parent, child, pose }: PoseSample) {
         let edge = self.edges.entry(child).or_insert_with(|| Edge::new(parent, fixed));
         // A frame with both fixed and moving transforms counts as moving. Of several fixed transforms the last counts.
         match (edge.fixed, fixed) {
@@ -126,18 +126,18 @@ impl Transforms {
     }
 
     /// Takes a live message, in any order. Keeps ten seconds of each frame, and restarts if a clock was set back.
-    pub(in crate::source) fn hear(&mut self, message: &[u8], fixed: bool, arrival: i64) -> Result<(), String> {
+    pub(in crate::source) fn receive(&mut self, message: &[u8], fixed: bool, arrival: i64) -> Result<(), String> {
         let samples = parse(message, Encoding::Cdr, arrival);
         let samples = samples.map_err(|fault| format!("{}: {}", fault.place(), fault.what))?;
-        for Sample { stamp, parent, child, pose } in samples {
-            if self.edges.len() >= MOST_FRAMES && !self.edges.contains_key(&child) {
-                return Err(format!("there are {MOST_FRAMES} other frames already; '{child}' is left out"));
+        for PoseSample { stamp, parent, child, pose } in samples {
+            if self.edges.len() >= MAX_FRAMES && !self.edges.contains_key(&child) {
+                return Err(format!("there are {MAX_FRAMES} other frames already; '{child}' is left out"));
             }
             let edge = self.edges.entry(child).or_insert_with(|| Edge::new(parent.clone(), fixed));
             if edge.parent != parent {
                 *edge = Edge::new(parent, fixed);
             }
-            edge.hear(fixed, stamp, pose);
+            edge.receive(fixed, stamp, pose);
         }
         Ok(())
     }
@@ -230,7 +230,7 @@ impl Edge {
     }
 
     /// Takes a live pose.
-    fn hear(&mut self, fixed: bool, stamp: i64, pose: Pose) {
+    fn receive(&mut self, fixed: bool, stamp: i64, pose: Pose) {
         // As in recordings, a frame with fixed and moving transforms moves. Of several fixed ones the last counts.
         match (self.fixed, fixed) {
             (false, true) => return,
@@ -238,7 +238,7 @@ impl Edge {
             (false, false) => {}
         }
         self.fixed = fixed;
-        if !fixed && matches!(self.clock.hear(stamp, KEPT), Order::Restarted { .. }) {
+        if !fixed && matches!(self.clock.receive(stamp, POSE_HISTORY), StampOrder::Restarted { .. }) {
             self.poses.clear();
         }
         let at = self.poses.partition_point(|(time, _)| *time < stamp);
@@ -247,8 +247,8 @@ impl Edge {
             _ => self.poses.insert(at, (stamp, pose)),
         }
         let newest = self.poses.back().map_or(stamp, |(time, _)| *time);
-        let oldest = newest.saturating_sub(KEPT.as_nanos() as i64);
-        while self.poses.len() > MOST_POSES || self.poses.front().is_some_and(|(time, _)| *time < oldest) {
+        let oldest = newest.saturating_sub(POSE_HISTORY.as_nanos() as i64);
+        while self.poses.len() > MAX_POSES || self.poses.front().is_some_and(|(time, _)| *time < oldest) {
             self.poses.pop_front();
         }
     }
@@ -277,7 +277,7 @@ impl Pose {
 }
 
 /// The transforms in the messages of one chunk, and whether each is fixed.
-fn samples(file: &File, run: &[Place]) -> Result<Vec<(bool, Sample)>, String> {
+fn samples(file: &File, run: &[MessagePosition]) -> Result<Vec<(bool, PoseSample)>, String> {
     let File { bytes, index, .. } = file;
     let content = run[0].chunk.map(|chunk| unpack(bytes, &index.chunks[chunk])).transpose()?;
     let records = content.as_deref().unwrap_or(bytes);
@@ -295,10 +295,10 @@ fn samples(file: &File, run: &[Place]) -> Result<Vec<(bool, Sample)>, String> {
 }
 
 /// The transforms of a message. Invalid poses are left out.
-fn parse(message: &[u8], encoding: Encoding, recorded: i64) -> Result<Vec<Sample>, Fault> {
+fn parse(message: &[u8], encoding: Encoding, recorded: i64) -> Result<Vec<PoseSample>, Fault> {
     let mut wire = Wire::message(message, encoding)?;
     let mut samples = Vec::new();
-    for _ in 0..wire.list(LEAST_TRANSFORM, "transforms")? {
+    for _ in 0..wire.list(MIN_TRANSFORM_BYTES, "transforms")? {
         let (stamp, parent) = header(&mut wire, encoding)?;
         let (parent, child) = (frame_name(&parent), frame_name(&wire.string("a frame's name")?));
         let mut numbers = [0.0; 7];
@@ -308,10 +308,10 @@ fn parse(message: &[u8], encoding: Encoding, recorded: i64) -> Result<Vec<Sample
         let [x, y, z, qx, qy, qz, qw] = numbers;
         let (translation, turn) = (DVec3::new(x, y, z), DVec4::new(qx, qy, qz, qw));
         let length = turn.length();
-        if translation.abs().max_element() < FARTHEST && (1e-6..1e6).contains(&length) && parent != child {
+        if translation.abs().max_element() < MAX_TRANSLATION_M && (1e-6..1e6).contains(&length) && parent != child {
             let pose = Pose { rotation: DQuat::from_vec4(turn / length), translation };
             let stamp = if stamp == 0 { recorded } else { stamp };
-            samples.push(Sample { stamp, parent, child, pose });
+            samples.push(PoseSample { stamp, parent, child, pose });
         }
     }
     Ok(samples)

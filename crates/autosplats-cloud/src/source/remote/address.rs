@@ -1,19 +1,19 @@
 //! Addresses of live points: `zenoh://HOST:PORT/TOPIC?domain=N`.
 
-use super::frames::TRANSFORMS;
+use super::frames::TRANSFORM_TOPICS;
 use crate::Error;
 
 /// Prefix of an address of live points.
 pub(super) const PREFIX: &str = "zenoh://";
 /// Form of an address, for messages.
-const FORM: &str = "zenoh://HOST:PORT/TOPIC?domain=N, where HOST, :PORT and ?domain=N may be left out";
+const ADDRESS_FORM: &str = "zenoh://HOST:PORT/TOPIC?domain=N, where HOST, :PORT and ?domain=N may be left out";
 /// Default port of Zenoh routers.
 const PORT: u16 = 7447;
 /// Type of PointCloud2 messages in the keys of rmw_zenoh.
-pub(super) const POINTS: &str = "sensor_msgs::msg::dds_::PointCloud2_";
+pub(super) const POINTS_TYPE: &str = "sensor_msgs::msg::dds_::PointCloud2_";
 
 /// Type of messages of transforms in the keys of rmw_zenoh.
-const TRANSFORM: &str = "tf2_msgs::msg::dds_::TFMessage_";
+const TRANSFORMS_TYPE: &str = "tf2_msgs::msg::dds_::TFMessage_";
 
 /// A parsed address.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub(super) struct Address {
 impl Address {
     pub(super) fn parse(url: &str) -> Result<Self, Error> {
         let bad = |what: String| Error::Remote { address: crate::error::message(url), what };
-        let rest = url.strip_prefix(PREFIX).ok_or_else(|| bad(format!("the address must be {FORM}")))?;
+        let rest = url.strip_prefix(PREFIX).ok_or_else(|| bad(format!("the address must be {ADDRESS_FORM}")))?;
         let (rest, query) = rest.split_once('?').map_or((rest, None), |(rest, query)| (rest, Some(query)));
         let domain = match query.map(|query| query.strip_prefix("domain=").and_then(|number| number.parse().ok())) {
             Some(None) => {
@@ -45,7 +45,7 @@ impl Address {
         let host = if authority.is_empty() {
             None
         } else {
-            Some(host(authority).ok_or_else(|| bad(format!("'{authority}' is no host; the form is {FORM}")))?)
+            Some(host(authority).ok_or_else(|| bad(format!("'{authority}' is no host; the form is {ADDRESS_FORM}")))?)
         };
         if topic.contains(char::is_control) {
             return Err(bad("the name of a topic must not contain control characters".into()));
@@ -81,7 +81,7 @@ impl Address {
     /// bridge. A pattern of bare names would match messages of all types; declarations of publishers give those names.
     pub(super) fn keys(&self) -> Vec<String> {
         let Self { topic, .. } = self;
-        let typed = format!("{}/{topic}/{POINTS}/*", self.domain_key());
+        let typed = format!("{}/{topic}/{POINTS_TYPE}/*", self.domain_key());
         if self.is_pattern() { vec![typed] } else { vec![typed, topic.clone()] }
     }
 
@@ -89,8 +89,9 @@ impl Address {
     /// first wildcard. Empty without a topic.
     pub(super) fn transform_keys(&self) -> Vec<String> {
         let domain = self.domain_key();
-        let named = |name: String| [format!("{domain}/{name}/{TRANSFORM}/*"), name];
-        let names = self.namespaces().into_iter().flat_map(|space| TRANSFORMS.map(|name| format!("{space}{name}")));
+        let named = |name: String| [format!("{domain}/{name}/{TRANSFORMS_TYPE}/*"), name];
+        let names =
+            self.namespaces().into_iter().flat_map(|space| TRANSFORM_TOPICS.map(|name| format!("{space}{name}")));
         names.flat_map(named).collect()
     }
 
@@ -99,9 +100,9 @@ impl Address {
     /// whose queries have the session before the key, and the bridge adds a prefix of its own.
     pub(super) fn history_keys(&self) -> Vec<String> {
         let domain = self.domain_key();
-        let [_, fixed] = TRANSFORMS;
+        let [_, fixed] = TRANSFORM_TOPICS;
         let asked = |space: String| {
-            let (bare, typed) = (format!("{space}{fixed}"), format!("{domain}/{space}{fixed}/{TRANSFORM}/*"));
+            let (bare, typed) = (format!("{space}{fixed}"), format!("{domain}/{space}{fixed}/{TRANSFORMS_TYPE}/*"));
             [
                 format!("{typed}/@adv/**"),
                 format!("*/{typed}"),

@@ -12,9 +12,9 @@ use super::graph::Topic;
 use crate::source::recording::transforms::{Placement, Transforms};
 
 /// Names of the ROS topics of moving and of fixed transforms.
-pub(super) const TRANSFORMS: [&str; 2] = ["tf", "tf_static"];
+pub(super) const TRANSFORM_TOPICS: [&str; 2] = ["tf", "tf_static"];
 /// Maximum number of robots with transforms.
-const MOST_ROBOTS: usize = 64;
+const MAX_ROBOTS: usize = 64;
 
 /// The transforms of all robots.
 #[derive(Debug, Default)]
@@ -36,16 +36,16 @@ impl Frames {
     }
 
     /// Takes a message of transforms. Returns the reason if it is refused.
-    pub(super) fn hear(&mut self, topic: &Topic, message: &[u8], arrival: i64) -> Result<(), String> {
+    pub(super) fn receive(&mut self, topic: &Topic, message: &[u8], arrival: i64) -> Result<(), String> {
         let Topic { name, domain, .. } = topic;
-        let [moving, fixed] = TRANSFORMS.map(|own| name.strip_suffix(own));
+        let [moving, fixed] = TRANSFORM_TOPICS.map(|own| name.strip_suffix(own));
         let (Some(namespace), fixed) = (moving.or(fixed), fixed.is_some()) else { return Ok(()) };
         let key = (*domain, namespace.to_owned());
-        if self.robots.len() >= MOST_ROBOTS && !self.robots.contains_key(&key) {
-            return Err(format!("there are transforms of {MOST_ROBOTS} other robots already; choose fewer topics"));
+        if self.robots.len() >= MAX_ROBOTS && !self.robots.contains_key(&key) {
+            return Err(format!("there are transforms of {MAX_ROBOTS} other robots already; choose fewer topics"));
         }
         let known = self.robots.contains_key(&key);
-        let heard = self.robots.entry(key.clone()).or_default().hear(message, fixed, arrival);
+        let heard = self.robots.entry(key.clone()).or_default().receive(message, fixed, arrival);
         if heard.is_err() && !known {
             // A message without valid transforms creates no robot.
             self.robots.remove(&key);
@@ -109,7 +109,7 @@ mod tests {
         ] {
             let parent = if name.contains("front") { "elsewhere" } else { "base" };
             let child = if name.contains("front") { "unknown" } else { "lidar" };
-            frames.hear(&topic(name, domain), &message(parent, child, right), 0)?;
+            frames.receive(&topic(name, domain), &message(parent, child, right), 0)?;
         }
         let mut right = |name: &str, domain| {
             let placement = frames.placement(&topic(name, domain), "lidar", 7_000_000_000)?;
@@ -131,19 +131,19 @@ mod tests {
         let points = topic("/points", None);
         let place = |frames: &mut Frames| frames.placement(&points, "lidar", 0).map(|place| place.is_some());
         assert!(place(&mut frames).is_err_and(|why| why.contains("'map'")), "nothing is known");
-        frames.hear(&topic("/tf", None), &message("base", "lidar", 1.0), 0)?;
+        frames.receive(&topic("/tf", None), &message("base", "lidar", 1.0), 0)?;
         let why = place(&mut frames).err().unwrap_or_default();
         assert_eq!(why, "no frame is called 'map'; there are: base, lidar", "as yet");
-        frames.hear(&topic("/tf", None), &message("map", "base", 1.0), 0)?;
+        frames.receive(&topic("/tf", None), &message("map", "base", 1.0), 0)?;
         assert_eq!(place(&mut frames), Ok(true), "now it is");
-        assert!(frames.hear(&topic("/tf", None), b"nonsense", 0).is_err(), "no message");
+        assert!(frames.receive(&topic("/tf", None), b"nonsense", 0).is_err(), "no message");
         Ok(())
     }
 
     #[test]
     fn made_up_robots_end_somewhere() {
         let mut frames = Frames::default();
-        let heard = (0..100).map(|n| frames.hear(&topic(&format!("/{n}/tf"), None), &message("a", "b", 0.0), 0));
-        assert_eq!(heard.filter(Result::is_ok).count(), MOST_ROBOTS, "no more of them");
+        let heard = (0..100).map(|n| frames.receive(&topic(&format!("/{n}/tf"), None), &message("a", "b", 0.0), 0));
+        assert_eq!(heard.filter(Result::is_ok).count(), MAX_ROBOTS, "no more of them");
     }
 }

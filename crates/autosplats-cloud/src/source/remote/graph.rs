@@ -13,16 +13,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{address::Address, frames::TRANSFORMS};
+use super::{address::Address, frames::TRANSFORM_TOPICS};
 
 /// Type of PointCloud2 messages in ROS notation.
 pub(super) const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
 /// Maximum number of stored tokens, enough for large fleets.
 const MAX_TOKENS: usize = 20_000;
 /// Maximum length of a key in bytes. Zenoh allows longer keys, but ROS does not use them.
-const MAX_KEY: usize = 1024;
+const MAX_KEY_BYTES: usize = 1024;
 /// Maximum number of topics listed in a message.
-const NAMED: usize = 5;
+const MAX_LISTED_TOPICS: usize = 5;
 
 /// A topic and its publishers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -79,7 +79,7 @@ fn ros_type(kind: &str) -> String {
 
 /// Whether a key may be stored and displayed.
 pub(super) fn is_name(key: &str) -> bool {
-    key.len() <= MAX_KEY && !key.contains(char::is_control)
+    key.len() <= MAX_KEY_BYTES && !key.contains(char::is_control)
 }
 
 /// All known publishers.
@@ -116,7 +116,7 @@ impl Graph {
 
     /// Number of publishers of transforms, of any robot.
     pub(super) fn transforms(&self) -> usize {
-        let last = |topic: &Topic| topic.name.rsplit('/').next().is_some_and(|name| TRANSFORMS.contains(&name));
+        let last = |topic: &Topic| topic.name.rsplit('/').next().is_some_and(|name| TRANSFORM_TOPICS.contains(&name));
         self.publishers.values().filter(|topic| last(topic)).count()
     }
 
@@ -174,8 +174,8 @@ impl Graph {
         let shown = &topics[..if points > 0 { points } else { topics.len() }];
         let mut names: Vec<&str> = shown.iter().map(|topic| &*topic.name).collect();
         names.dedup();
-        let more = names.len().saturating_sub(NAMED);
-        names.truncate(NAMED);
+        let more = names.len().saturating_sub(MAX_LISTED_TOPICS);
+        names.truncate(MAX_LISTED_TOPICS);
         let what = if points > 0 { "known topics" } else { "known topics, none of them with points" };
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         match *names {

@@ -28,15 +28,15 @@ use zenoh::{
 use super::{address::Address, graph::Graph, state::Shared};
 
 /// Time between two attempts to open a connection.
-const RETRY: Duration = Duration::from_secs(1);
+const RETRY_INTERVAL: Duration = Duration::from_secs(1);
 /// Time between two checks of the connection.
-const LOOK: Duration = Duration::from_millis(100);
+const CHECK_INTERVAL: Duration = Duration::from_millis(100);
 /// How long to wait for the answer to a query for earlier transforms.
-const HISTORY: Duration = Duration::from_secs(5);
+const HISTORY_TIMEOUT: Duration = Duration::from_secs(5);
 /// First and longest pause between two queries for earlier transforms.
-const ASK_AGAIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(32)];
+const HISTORY_PAUSES: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(32)];
 /// Timeout of the connection attempt that finds why nobody answers.
-const PROBE: Duration = Duration::from_secs(1);
+const PROBE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Router that nodes with rmw_zenoh connect to, since they do not announce themselves on the network.
 const OWN_ROUTER: &str = "tcp/localhost:7447";
 
@@ -60,13 +60,13 @@ fn run(address: &Address, shared: &Arc<Shared>) {
             Ok(session) => break session,
             Err(fault) => shared.lock().connection.fault = Some(fault),
         }
-        if shared.stopped(RETRY) {
+        if shared.stopped(RETRY_INTERVAL) {
             return;
         }
     };
     // Before the first message can arrive.
     look(&session, shared);
-    let mut heard = BTreeMap::new();
+    let mut subscriptions = BTreeMap::new();
     // Subscriptions to tokens and transforms; dropping them unsubscribes.
     let mut tokens = Vec::new();
     // Points come last, so that transforms and tokens known about them arrive no later.
@@ -81,21 +81,22 @@ fn run(address: &Address, shared: &Arc<Shared>) {
         })
     });
     let keys = if address.topic.is_empty() { Vec::new() } else { address.keys() };
-    let declared = declared.and_then(|()| keys.into_iter().try_for_each(|key| hear(&session, key, shared, &mut heard)));
+    let declared =
+        declared.and_then(|()| keys.into_iter().try_for_each(|key| receive(&session, key, shared, &mut subscriptions)));
     if let Err(error) = declared {
         shared.lock().refuse(format!("nothing can be subscribed to: {error}"));
     }
     let mut history = History::default();
-    while !shared.stopped(LOOK) {
+    while !shared.stopped(CHECK_INTERVAL) {
         look(&session, shared);
         let state = shared.lock();
         let asks = history.is_due((state.connection.times, state.graph.transforms()), state.connection.connected);
         let mut wanted = Vec::new();
-        if state.listen && !heard.contains_key("**") {
+        if state.listen && !subscriptions.contains_key("**") {
             wanted.push("**".to_owned());
         }
         if address.is_pattern() {
-            wanted.extend(state.graph.bridged(address).into_iter().filter(|key| !heard.contains_key(key)));
+            wanted.extend(state.graph.bridged(address).into_iter().filter(|key| !subscriptions.contains_key(key)));
         }
         drop(state);
         let asked = if asks { address.history_keys() } else { Vec::new() };
@@ -105,7 +106,7 @@ fn run(address: &Address, shared: &Arc<Shared>) {
             }
         }
         for key in wanted {
-            if let Err(error) = hear(&session, key, shared, &mut heard) {
+            if let Err(error) = receive(&session, key, shared, &mut subscriptions) {
                 shared.lock().refuse(error.to_string());
             }
         }
@@ -120,17 +121,22 @@ fn look(session: &Session, shared: &Shared) {
 }
 
 /// Subscriptions to points by key.
-type Heard = BTreeMap<String, Subscriber<()>>;
+type Subscriptions = BTreeMap<String, Subscriber<()>>;
 
 /// Subscribes to points.
-fn hear(session: &Session, key: String, shared: &Arc<Shared>, heard: &mut Heard) -> zenoh::Result<()> {
+fn receive(
+    session: &Session,
+    key: String,
+    shared: &Arc<Shared>,
+    subscriptions: &mut Subscriptions,
+) -> zenoh::Result<()> {
     let shared = shared.clone();
     let put = move |sample: Sample| {
         if sample.kind() == SampleKind::Put {
             shared.put(sample.key_expr().as_str(), sample.payload().clone());
         }
     };
-    heard.insert(key.clone(), session.declare_subscriber(key).callback(put).wait()?);
+    subscriptions.insert(key.clone(), session.declare_subscriber(key).callback(put).wait()?);
     Ok(())
 }
 
@@ -139,7 +145,7 @@ fn hear_transforms(session: &Session, key: &str, shared: &Arc<Shared>) -> zenoh:
     let shared = shared.clone();
     let put = move |sample: Sample| {
         if sample.kind() == SampleKind::Put {
-            shared.hear(sample.key_expr().as_str(), sample.payload());
+            shared.receive(sample.key_expr().as_str(), sample.payload());
         }
     };
     session.declare_subscriber(key.to_owned()).callback(put).wait()
@@ -156,7 +162,7 @@ struct History {
 
 impl History {
     fn is_due(&mut self, others: (u64, usize), connected: bool) -> bool {
-        let [first, longest] = ASK_AGAIN;
+        let [first, longest] = HISTORY_PAUSES;
         let new = std::mem::replace(&mut self.others, others) != others;
         let pause = match self.asked {
             _ if !connected => return false,
@@ -175,12 +181,12 @@ fn ask(session: &Session, key: String, shared: &Arc<Shared>) -> zenoh::Result<()
     let shared = shared.clone();
     let answered = move |reply: Reply| {
         if let Ok(sample) = reply.result() {
-            shared.hear(sample.key_expr().as_str(), sample.payload());
+            shared.receive(sample.key_expr().as_str(), sample.payload());
         }
     };
     // All answers to a query count. Each arrives under the key of its message, which differs from the query's key.
     let asked = session.get(key).target(QueryTarget::All).consolidation(ConsolidationMode::None);
-    asked.accept_replies(ReplyKeyExpr::Any).timeout(HISTORY).callback(answered).wait()
+    asked.accept_replies(ReplyKeyExpr::Any).timeout(HISTORY_TIMEOUT).callback(answered).wait()
 }
 
 /// Subscribes to the tokens of publishers, including existing ones.
@@ -232,7 +238,7 @@ fn why_unreachable(host: &str, port: u16) -> String {
     let Some(first) = (bare, port).to_socket_addrs().ok().and_then(|mut addresses| addresses.next()) else {
         return format!("no machine is called '{host}'");
     };
-    match TcpStream::connect_timeout(&first, PROBE) {
+    match TcpStream::connect_timeout(&first, PROBE_TIMEOUT) {
         Ok(_) => "something else answers there".into(),
         Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => "nobody listens there".into(),
         Err(error) if error.kind() == io::ErrorKind::TimedOut => "the machine does not answer".into(),

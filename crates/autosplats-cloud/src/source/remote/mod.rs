@@ -37,10 +37,10 @@ use super::{
 use crate::{Error, Progress, ReadOptions};
 
 /// Time between two checks for cancellation.
-const ASK: Duration = Duration::from_millis(50);
+const CANCEL_CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Time between two checks for transforms.
-const SETTLE: Duration = Duration::from_millis(10);
+const TRANSFORMS_CHECK_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Options of [`Remote::open`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -71,7 +71,7 @@ pub struct Remote {
     options: RemoteOptions,
     shared: Arc<Shared>,
     /// Channels that have reported points without a return, or missing transforms. Each is reported once.
-    told: Vec<[bool; 2]>,
+    noted: Vec<[bool; 2]>,
 }
 
 impl Remote {
@@ -96,7 +96,7 @@ impl Remote {
         shared.lock().frames = Frames::new(options.frame.as_deref().map(frame_name));
         link::start(address.clone(), shared.clone())
             .map_err(|error| Error::Remote { address: url.into(), what: format!("cannot start thread: {error}") })?;
-        Ok(Self { address, options: options.clone(), shared, told: Vec::new() })
+        Ok(Self { address, options: options.clone(), shared, noted: Vec::new() })
     }
 
     /// The topic of each channel so far.
@@ -139,8 +139,8 @@ impl Remote {
         state.unplaced = None;
         state.statistics.taken += 1;
         drop(state);
-        self.told.resize(self.told.len().max(channel + 1), [false; 2]);
-        let [no_returns, frames] = &mut self.told[channel];
+        self.noted.resize(self.noted.len().max(channel + 1), [false; 2]);
+        let [no_returns, frames] = &mut self.noted[channel];
         if decoded.no_returns > 0 && !std::mem::replace(no_returns, true) {
             let (count, total) = (decoded.no_returns, decoded.no_returns + cloud.len());
             let note = format!("{name}: dropped {count} of {total} points at (0, 0, 0), where nothing was measured");
@@ -171,8 +171,8 @@ impl Stream for Remote {
             let left = patience.saturating_sub(begin.elapsed());
             let settling = self.shared.lock().is_settling();
             if settling {
-                thread::sleep(left.min(SETTLE));
-            } else if let Some((channel, message)) = self.shared.take(left.min(ASK))
+                thread::sleep(left.min(TRANSFORMS_CHECK_INTERVAL));
+            } else if let Some((channel, message)) = self.shared.take(left.min(CANCEL_CHECK_INTERVAL))
                 && let Some(update) = self.update(channel, &message, progress)
             {
                 return Ok(Next::Update(update));

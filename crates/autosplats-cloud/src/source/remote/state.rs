@@ -17,11 +17,11 @@ use crate::Statistics;
 /// Maximum number of channels of one connection; more do not occur.
 const MAX_CHANNELS: usize = 64;
 /// Time without a message after which the silence is reported.
-const SILENCE: Duration = Duration::from_secs(5);
+const MIN_SILENCE: Duration = Duration::from_secs(5);
 /// How long the first points wait for a sign that somebody publishes transforms.
-const SIGNS: Duration = Duration::from_millis(300);
+const NO_TRANSFORMS_WAIT: Duration = Duration::from_millis(300);
 /// How long the first points wait for transforms if somebody publishes them; robots send them at least every second.
-const SETTLING: Duration = Duration::from_secs(1);
+const TRANSFORMS_WAIT: Duration = Duration::from_secs(1);
 
 /// The state and its lock.
 #[derive(Debug, Default)]
@@ -42,9 +42,9 @@ pub(super) struct State {
     pub(super) connection: Connection,
     /// First channel whose points cannot be transformed into the frame asked for, and why, until other points can be.
     pub(super) unplaced: Option<(usize, String)>,
-    /// Time of the first message. `heard` is the time of the last.
+    /// Time of the first message. `last_message` is the time of the last.
     first: Option<Instant>,
-    heard: Option<Instant>,
+    last_message: Option<Instant>,
     /// Whether to listen to all messages.
     pub(super) listen: bool,
     /// Whether nobody takes points any more.
@@ -84,12 +84,12 @@ impl Shared {
     }
 
     /// Takes transforms.
-    pub(super) fn hear(&self, key: &str, payload: &ZBytes) {
+    pub(super) fn receive(&self, key: &str, payload: &ZBytes) {
         if is_name(key) {
             let topic = Topic::of_key(key);
             let message = payload.to_bytes();
             let mut state = self.lock();
-            if let Err(why) = state.frames.hear(&topic, &message, now()) {
+            if let Err(why) = state.frames.receive(&topic, &message, now()) {
                 state.refuse(format!("{}: {why}", topic.name));
             }
         }
@@ -108,7 +108,7 @@ impl Shared {
         let replaced = state.channels[channel].newest.replace(Message { payload, arrival });
         state.statistics.dropped += u64::from(replaced.is_some());
         let now = Instant::now();
-        (state.first, state.heard) = (state.first.or(Some(now)), Some(now));
+        (state.first, state.last_message) = (state.first.or(Some(now)), Some(now));
         drop(state);
         // Frees megabytes after the lock is released.
         drop(replaced);
@@ -150,7 +150,7 @@ impl State {
     /// Whether the first points have not arrived, or still wait for the transforms of their robot.
     pub(super) fn is_settling(&self) -> bool {
         let known = !self.frames.is_empty() || self.graph.transforms() > 0;
-        let patience = if known { SETTLING } else { SIGNS };
+        let patience = if known { TRANSFORMS_WAIT } else { NO_TRANSFORMS_WAIT };
         self.first.is_none_or(|first| first.elapsed() < patience)
     }
 
@@ -188,7 +188,7 @@ impl State {
 
     /// Why nothing arrives, in one line; `None` if something does.
     pub(super) fn waiting(&self, address: &Address) -> Option<String> {
-        let silence = self.heard.map(|heard| heard.elapsed());
+        let silence = self.last_message.map(|last_message| last_message.elapsed());
         if !self.connection.connected {
             let place = match address.endpoint() {
                 Some(endpoint) => format!("no router at {endpoint}"),
@@ -197,7 +197,7 @@ impl State {
             let why = self.connection.fault.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
             return Some(crate::error::message(&(place + &why)));
         }
-        if silence.is_some_and(|silence| silence < SILENCE) {
+        if silence.is_some_and(|silence| silence < MIN_SILENCE) {
             return self.unplaced.as_ref().map(|(_, why)| crate::error::message(why));
         }
         let told = match (self.graph.has(address), silence) {

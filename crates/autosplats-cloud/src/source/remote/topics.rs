@@ -20,9 +20,9 @@ use crate::{
 };
 
 /// The search ends when something is found and nothing new appears for this long.
-const QUIET: Duration = Duration::from_millis(700);
+const QUIET_TIME: Duration = Duration::from_millis(700);
 /// Time between two checks.
-const LOOK: Duration = Duration::from_millis(50);
+const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The topics published at `zenoh://HOST:PORT/?domain=N`: topics of points first, then sorted by name.
 ///
@@ -54,10 +54,10 @@ fn find(address: &Address, shared: &Shared, patience: Duration) -> Result<Vec<To
         drop(state);
         if now != known {
             (known, changed) = (now, Instant::now());
-        } else if known > 0 && changed.elapsed() > QUIET {
+        } else if known > 0 && changed.elapsed() > QUIET_TIME {
             break;
         }
-        thread::sleep(LOOK);
+        thread::sleep(CHECK_INTERVAL);
     }
     let state = shared.lock();
     if !state.connection.connected {

@@ -71,13 +71,13 @@ impl Default for Scanner {
 }
 
 /// Elevation of scanners placed around a surface, degrees.
-const ABOVE: f64 = 15.0;
+const PLACED_ELEVATION_DEG: f64 = 15.0;
 
 /// Factor on the distance of scanners, which leaves a margin around the surface.
-const ROOM: f64 = 1.1;
+const PLACED_DISTANCE_FACTOR: f64 = 1.1;
 
 /// Noise of the first of several scanners, relative to the radius of the surface. The n-th scanner has n times as much.
-const NOISE: f64 = 1e-3;
+const FIRST_NOISE_RADII: f64 = 1e-3;
 
 impl Scanner {
     /// Places `count` scanners around the box from `low` to `high`, at equal angles and slightly above it. They look at
@@ -86,14 +86,14 @@ impl Scanner {
         let up = up.normalize_or(DVec3::Z);
         let (centre, radius) = (0.5 * (low + high), (0.5 * (high - low).length()).max(f64::MIN_POSITIVE));
         let own = Self::default();
-        let distance = ROOM * radius / (0.5 * own.fov_degrees[1]).to_radians().sin();
+        let distance = PLACED_DISTANCE_FACTOR * radius / (0.5 * own.fov_degrees[1]).to_radians().sin();
         let right = up.any_orthonormal_vector();
         let placed = |index: usize| {
             let around = DQuat::from_axis_angle(up, TAU * index as f64 / count as f64) * right;
-            let (sin, cos) = ABOVE.to_radians().sin_cos();
+            let (sin, cos) = PLACED_ELEVATION_DEG.to_radians().sin_cos();
             let eye = centre + distance * (cos * around + sin * up);
             let world_from_sensor = looking(eye, centre, up);
-            Self { world_from_sensor, noise: NOISE * (index + 1) as f64 * radius, ..own.clone() }
+            Self { world_from_sensor, noise: FIRST_NOISE_RADII * (index + 1) as f64 * radius, ..own.clone() }
         };
         (0..count).map(placed).collect()
     }
@@ -135,7 +135,7 @@ fn looking(eye: DVec3, centre: DVec3, up: DVec3) -> DMat4 {
 }
 
 /// A measured point and its colour, if the target has colours.
-type Seen = ([f32; 3], Option<[u8; 3]>);
+type ScanPoint = ([f32; 3], Option<[u8; 3]>);
 
 /// Scans of a moving surface, one channel per scanner.
 pub(super) struct Scanned {
@@ -166,7 +166,7 @@ impl Scanned {
         // The error of the assumed pose is the same in all frames.
         let believed = scanner.believed(&mut self.random(index, usize::MAX, 0));
         let rays = Rays::new(scanner);
-        let sight = target.seen_along(&rays);
+        let sight = target.prepared_for(&rays);
         let origin = target.origin();
         let row = |row: u32| {
             if progress.cancelled() {
@@ -189,7 +189,7 @@ impl Scanned {
             };
             (0..scanner.columns).filter_map(seen).collect()
         };
-        let rows: Vec<Vec<Seen>> = (0..scanner.rows).into_par_iter().map(row).collect();
+        let rows: Vec<Vec<ScanPoint>> = (0..scanner.rows).into_par_iter().map(row).collect();
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }

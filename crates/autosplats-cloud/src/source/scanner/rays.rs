@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use super::Scanner;
 
 /// Minimum number of rows per thread, and maximum number of bands of rows.
-const BAND: [usize; 2] = [16, 32];
+const BAND_LIMITS: [usize; 2] = [16, 32];
 
 /// Margins of windows against rounding: share of the angle between rays, angle in radians, share of a ball's radius.
-const SLACK: [f64; 3] = [1e-3, 1e-12, 1e-6];
+const WINDOW_MARGINS: [f64; 3] = [1e-3, 1e-12, 1e-6];
 
 /// Rays from one place, at equal steps of azimuth and elevation.
 pub(super) struct Rays {
@@ -91,7 +91,7 @@ impl Rays {
     /// The rays that may hit a ball, given in the scanner's frame; `None` if no ray does.
     pub(super) fn window(&self, centre: DVec3, radius: f64) -> Option<Window> {
         let distance = centre.length();
-        let sine = radius * (1.0 + SLACK[2]) / distance;
+        let sine = radius * (1.0 + WINDOW_MARGINS[2]) / distance;
         // Written so that NaN gives all rays.
         if !(sine < 0.99) {
             return Some(Window { rows: 0..self.rows, columns: [0..self.columns, 0..0] });
@@ -101,7 +101,7 @@ impl Rays {
         if rows.is_empty() {
             return None;
         }
-        if elevation.abs() + reach > FRAC_PI_2 - SLACK[1] {
+        if elevation.abs() + reach > FRAC_PI_2 - WINDOW_MARGINS[1] {
             return Some(Window { rows, columns: [0..self.columns, 0..0] });
         }
         let (azimuth, reach) = (centre.x.atan2(centre.z), (sine / elevation.cos()).min(1.0).asin());
@@ -115,8 +115,10 @@ impl Rays {
     fn run(&self, axis: usize, angle: f64, reach: f64) -> Range<u32> {
         let count = [self.columns, self.rows][axis];
         let per_radian = f64::from(count) / self.fov[axis];
-        let (middle, reach) =
-            (angle * per_radian + 0.5 * f64::from(count) - 0.5, (reach + SLACK[1]) * per_radian + SLACK[0]);
+        let (middle, reach) = (
+            angle * per_radian + 0.5 * f64::from(count) - 0.5,
+            (reach + WINDOW_MARGINS[1]) * per_radian + WINDOW_MARGINS[0],
+        );
         // Clamps the ends to the first and the last ray.
         (middle - reach).ceil().max(0.0) as u32..((middle + reach).floor() + 1.0).clamp(0.0, f64::from(count)) as u32
     }
@@ -131,7 +133,7 @@ impl Rays {
     ) -> Vec<T> {
         let (columns, rows) = (self.columns as usize, self.rows as usize);
         let mut all = vec![start; columns * rows];
-        let band = BAND[0].max(rows.div_ceil(BAND[1]));
+        let band = BAND_LIMITS[0].max(rows.div_ceil(BAND_LIMITS[1]));
         let mut by_band = vec![Vec::new(); rows.div_ceil(band)];
         for (index, (window, _)) in things.iter().enumerate() {
             let bands = window.rows.start as usize / band..(window.rows.end as usize).div_ceil(band);

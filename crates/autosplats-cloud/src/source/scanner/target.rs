@@ -11,10 +11,10 @@ use super::{
 use crate::{Axes, Contents, Crs, Error, Scene, source::animation::Surface};
 
 /// A part of a scene whose window has at most this many rays is not subdivided.
-const SMALL: u64 = 25;
+const MAX_UNCUT_RAYS: u64 = 25;
 
 /// Relative margin on the span of a ray that is searched.
-const SLACK: f32 = 1e-6;
+const RELATIVE_RANGE_MARGIN: f32 = 1e-6;
 
 /// A surface that rays can hit.
 pub(super) enum Target {
@@ -29,7 +29,7 @@ pub(super) struct Hit {
 }
 
 /// A target prepared for all rays of a scanner.
-pub(super) enum Sight<'a> {
+pub(super) enum PreparedTarget<'a> {
     /// Nearest and farthest distance at which each ray may hit something, if known. Far is below near if none.
     Scene(&'a Scene, Option<Vec<[f32; 2]>>),
     Mesh(&'a Contents, &'a Triangles, Vec<Nearest>),
@@ -79,10 +79,12 @@ impl Target {
     }
 
     /// Prepares the target for all rays of a scanner.
-    pub(super) fn seen_along(&self, rays: &Rays) -> Sight<'_> {
+    pub(super) fn prepared_for(&self, rays: &Rays) -> PreparedTarget<'_> {
         match self {
-            Self::Scene(scene) => Sight::Scene(scene, spans(scene, rays)),
-            Self::Mesh(mesh, triangles) => Sight::Mesh(mesh, triangles, triangles.nearest(rays, mesh.cloud.origin())),
+            Self::Scene(scene) => PreparedTarget::Scene(scene, spans(scene, rays)),
+            Self::Mesh(mesh, triangles) => {
+                PreparedTarget::Mesh(mesh, triangles, triangles.nearest(rays, mesh.cloud.origin()))
+            }
         }
     }
 }
@@ -93,12 +95,12 @@ fn spans(scene: &Scene, rays: &Rays) -> Option<Vec<[f32; 2]>> {
     let mut parts: Vec<(Window, [f32; 2])> = Vec::new();
     let known = scene.cubes(&mut |middle, half, whole| {
         let Some(window) = rays.window(rays.in_sensor(middle - rays.eye), half * cube_radius) else { return false };
-        if !whole && window.len() > SMALL {
+        if !whole && window.len() > MAX_UNCUT_RAYS {
             return true;
         }
         let (distance, radius) = (middle.distance(rays.eye), half * 3.0_f64.sqrt());
         let (near, far) = ((distance - radius) as f32, (distance + radius) as f32);
-        parts.push((window, [near - SLACK * far, far + SLACK * far]));
+        parts.push((window, [near - RELATIVE_RANGE_MARGIN * far, far + RELATIVE_RANGE_MARGIN * far]));
         false
     });
     known.then(|| {
@@ -108,7 +110,7 @@ fn spans(scene: &Scene, rays: &Rays) -> Option<Vec<[f32; 2]>> {
     })
 }
 
-impl Sight<'_> {
+impl PreparedTarget<'_> {
     /// Whether a ray, numbered row by row, may hit anything.
     pub(super) fn may_meet(&self, ray: usize) -> bool {
         match self {

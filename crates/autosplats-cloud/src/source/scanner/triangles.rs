@@ -15,16 +15,16 @@ use crate::{Contents, Error, memory::check_memory};
 const BYTES_PER_TRIANGLE: u64 = 300;
 
 /// Number of rays in a window up to which a triangle is not cut.
-const SMALL: u64 = 64;
+const MAX_UNCUT_RAYS: u64 = 64;
 
 /// Maximum number of times a triangle is halved. Parts left after that are so near that all rays may hit them.
-const CUTS: u32 = 40;
+const MAX_CUTS: u32 = 40;
 
-/// Relative rounding error of the products in [`Sides`]. Larger than the slack on the weights of a hit.
+/// Relative rounding error of the products in [`TriangleProducts`]. Larger than the slack on the weights of a hit.
 const ROUNDING: f64 = 1e-8;
 
 /// Number of triangles per parallel task.
-const PIECE: usize = 1 << 10;
+const TASK_TRIANGLES: usize = 1 << 10;
 
 /// The triangles with an area.
 pub(super) struct Triangles(Vec<Triangle>);
@@ -61,16 +61,16 @@ impl Triangles {
     /// The nearest triangle of each ray, row by row. `origin` is the cloud's.
     pub(super) fn nearest(&self, rays: &Rays, origin: DVec3) -> Vec<Nearest> {
         let eye = rays.eye - origin;
-        let windows = self.0.par_chunks(PIECE).enumerate().flat_map_iter(|(piece, triangles)| {
+        let windows = self.0.par_chunks(TASK_TRIANGLES).enumerate().flat_map_iter(|(piece, triangles)| {
             let mut windows = Vec::new();
-            for (index, triangle) in (piece * PIECE..).zip(triangles) {
+            for (index, triangle) in (piece * TASK_TRIANGLES..).zip(triangles) {
                 let places = triangle.places.map(|place| rays.in_sensor(place - eye));
-                let sides = Sides::new(index as u32, places);
-                cover(rays, places, CUTS, &mut |window| windows.push((window, sides)));
+                let sides = TriangleProducts::new(index as u32, places);
+                cover(rays, places, MAX_CUTS, &mut |window| windows.push((window, sides)));
             }
             windows
         });
-        let windows: Vec<(Window, Sides)> = windows.collect();
+        let windows: Vec<(Window, TriangleProducts)> = windows.collect();
         let none = Nearest { distance: f64::INFINITY, index: u32::MAX };
         rays.put_all(&windows, none, |nearest, sides, column, row| {
             let direction = rays.direction(column, row);
@@ -95,7 +95,7 @@ impl Triangles {
 
 /// A triangle as seen from one scanner. Products shared by all rays rule out most rays with a few dot products.
 #[derive(Clone, Copy)]
-struct Sides {
+struct TriangleProducts {
     index: u32,
     /// Where a ray meets the plane, the second and third corner have the weights `second` and `third` divided by
     /// `plane`, each as a dot product with the ray's direction.
@@ -106,7 +106,7 @@ struct Sides {
     slack: f64,
 }
 
-impl Sides {
+impl TriangleProducts {
     /// Creates the products from corners in the scanner's frame.
     fn new(index: u32, [a, b, c]: [DVec3; 3]) -> Self {
         let (ab, ac) = (b - a, c - a);
@@ -131,7 +131,7 @@ fn cover(rays: &Rays, places: [DVec3; 3], cuts: u32, found: &mut impl FnMut(Wind
     let middle = (a + b + c) / 3.0;
     let radius = places.map(|place| place.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
     let Some(window) = rays.window(middle, radius) else { return };
-    if window.len() <= SMALL || cuts == 0 {
+    if window.len() <= MAX_UNCUT_RAYS || cuts == 0 {
         return found(window);
     }
     // Halves the longest side.
@@ -173,7 +173,7 @@ mod tests {
     use crate::{PointCloud, Scanner, random::Random};
 
     /// Triangles of all sizes and shapes around the origin, some of them slivers, and one around everything.
-    fn strewn() -> Contents {
+    fn scattered() -> Contents {
         let mut random = Random::new(1, 0);
         let mut positions = vec![[-90.0, 20.0, -80.0], [90.0, 25.0, -80.0], [0.0, 30.0, 95.0]];
         for number in 0..300 {
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn rays_end_where_a_look_at_all_triangles_says() -> Result<(), Error> {
-        let triangles = Triangles::new(&strewn())?;
+        let triangles = Triangles::new(&scattered())?;
         assert_eq!(triangles.0.len(), 301, "those without area, or without corners, are left out");
         let mut hits = 0;
         for (number, view) in [[57.0, 43.0], [360.0, 180.0], [360.0, 30.0], [3.0, 2.0]].into_iter().enumerate() {

@@ -24,15 +24,15 @@ const GOLD: Paint = Paint::Mottled { rgb: [204, 164, 82], grain: 0.1, depth: 0.0
 
 const HALF_BAY: f64 = 3.0;
 /// Middle of the last bay.
-const LAST: f64 = 18.0;
+const LAST_BAY_X: f64 = 18.0;
 /// Column axis, and the plane of the arcade.
-const ARCADE: f64 = 5.0;
+const ARCADE_Y: f64 = 5.0;
 /// Inner face of the nave's wall.
-const NAVE: f64 = 4.6;
+const NAVE_WALL_Y: f64 = 4.6;
 /// Inner face of the outer wall.
-const OUTER: f64 = 9.5;
+const OUTER_WALL_Y: f64 = 9.5;
 /// Inner face of the end wall.
-const END: f64 = 7.5;
+const END_WALL_X: f64 = 7.5;
 
 /// The cathedral, scanned from six places.
 pub(super) fn scene() -> Model {
@@ -44,7 +44,7 @@ pub(super) fn scene() -> Model {
     column(&mut body);
     pews(&mut body);
     end(&mut body);
-    let fold = Fold::Bays { half_bay: HALF_BAY, last: LAST };
+    let fold = Fold::Bays { half_bay: HALF_BAY, last: LAST_BAY_X };
     let tree = Octree::new(body, fold, DVec3::new(0.0, 0.0, -1.0), 24.0, 8);
     let stations = [
         DVec3::new(-14.2, 0.12, 1.75),
@@ -65,7 +65,7 @@ fn block(low: [f64; 3], high: [f64; 3], round: f64) -> Shape {
 /// A vault or arch along x, centred on `y`, with its floor at `floor`. `spring` counts from z = 0.
 fn along_x(y: f64, floor: f64, half_width: f64, spring: f64, radius: f64) -> Shape {
     let at = Placement { origin: DVec3::new(0.0, y, floor), axes: DMat3::from_rotation_z(FRAC_PI_2) };
-    Shape::Passage { at, half_width, spring: spring - floor, radius, half_length: END }
+    Shape::Passage { at, half_width, spring: spring - floor, radius, half_length: END_WALL_X }
 }
 
 /// A vault or arch along y, in the middle of the bay, from y = `from` to `to`.
@@ -76,13 +76,16 @@ fn along_y(from: f64, to: f64, floor: f64, half_width: f64, spring: f64, radius:
 
 /// Inner faces of the nave's vaults, `inset` metres into the room.
 fn nave_vault(inset: f64) -> [Shape; 2] {
-    [along_x(0.0, -0.1, NAVE - inset, 10.6, 6.9 - inset), along_y(-5.2, 5.2, 9.75, 2.72 - inset, 13.3, 4.1 - inset)]
+    [
+        along_x(0.0, -0.1, NAVE_WALL_Y - inset, 10.6, 6.9 - inset),
+        along_y(-5.2, 5.2, 9.75, 2.72 - inset, 13.3, 4.1 - inset),
+    ]
 }
 
 fn aisle_vault(inset: f64) -> [Shape; 2] {
     [
         along_x(7.45, -0.1, 2.05 - inset, 5.3, 2.9 - inset),
-        along_y(5.0, OUTER - 0.05, -0.1, 2.62 - inset, 5.3, 3.25 - inset),
+        along_y(5.0, OUTER_WALL_Y - 0.05, -0.1, 2.62 - inset, 5.3, 3.25 - inset),
     ]
 }
 
@@ -97,13 +100,13 @@ fn mass(body: &mut Body) {
     }
     body.paint = STONE;
     // The arcade, in two orders, and the space around the columns below it.
-    body.cut(0.0, along_y(ARCADE - 0.6, ARCADE + 0.6, -0.1, 2.15, 5.3, 3.0));
-    body.cut(0.0, along_y(ARCADE - 0.6, ARCADE - 0.18, -0.1, 2.38, 5.3, 3.2));
-    body.cut(0.0, along_y(ARCADE + 0.18, ARCADE + 0.6, -0.1, 2.38, 5.3, 3.2));
-    body.cut(0.0, block([-1.0, ARCADE - 0.6, -0.1], [END, ARCADE + 0.6, 5.15], 0.0));
+    body.cut(0.0, along_y(ARCADE_Y - 0.6, ARCADE_Y + 0.6, -0.1, 2.15, 5.3, 3.0));
+    body.cut(0.0, along_y(ARCADE_Y - 0.6, ARCADE_Y - 0.18, -0.1, 2.38, 5.3, 3.2));
+    body.cut(0.0, along_y(ARCADE_Y + 0.18, ARCADE_Y + 0.6, -0.1, 2.38, 5.3, 3.2));
+    body.cut(0.0, block([-1.0, ARCADE_Y - 0.6, -0.1], [END_WALL_X, ARCADE_Y + 0.6, 5.15], 0.0));
     // The gallery above the arcade: three niches per half bay.
     for x in [0.5, 1.5] {
-        let at = Placement::at(DVec3::new(x, NAVE, 8.95));
+        let at = Placement::at(DVec3::new(x, NAVE_WALL_Y, 8.95));
         body.cut(0.0, Shape::Passage { at, half_width: 0.3, spring: 0.28, radius: 0.36, half_length: 0.32 });
     }
     body.paint = Paint::Tiles;
@@ -112,7 +115,8 @@ fn mass(body: &mut Body) {
 
 /// Lancets in the aisles and pairs of lancets under the vault, with stone bars in front of coloured glass.
 fn windows(body: &mut Body) {
-    for (wall, sill, half, spring, radius) in [(OUTER - 0.05, 1.9, 1.15, 5.0, 1.7), (5.2, 10.2, 1.35, 13.0, 2.1)] {
+    for (wall, sill, half, spring, radius) in [(OUTER_WALL_Y - 0.05, 1.9, 1.15, 5.0, 1.7), (5.2, 10.2, 1.35, 13.0, 2.1)]
+    {
         body.group(Op::Cut, 0.02);
         body.paint = STONE;
         for (grow, depth) in [(0.12, 0.16), (0.0, 0.5)] {
@@ -161,7 +165,7 @@ fn ribs(body: &mut Body) {
         Shape::Block { at, half: DVec3::new(0.5 * along.length(), thick, 0.5 * (high - low)), round: 0.0 }
     };
     body.paint = TRIM;
-    let corner = DVec2::new(HALF_BAY, NAVE);
+    let corner = DVec2::new(HALF_BAY, NAVE_WALL_Y);
     for (thick, inset) in [(0.17, 0.12), (0.085, 0.22)] {
         body.group(Op::Join, 0.02);
         body.join(0.0, upright(DVec2::ZERO, corner, thick, 10.9, 18.5));
@@ -172,7 +176,7 @@ fn ribs(body: &mut Body) {
     }
     for (thick, inset) in [(0.12, 0.09), (0.06, 0.16)] {
         body.group(Op::Join, 0.015);
-        let (near, far) = (ARCADE + 0.4, OUTER);
+        let (near, far) = (ARCADE_Y + 0.4, OUTER_WALL_Y);
         let middle = 7.45;
         body.join(0.0, upright(DVec2::new(0.0, middle), DVec2::new(HALF_BAY, near), thick, 5.3, 9.5));
         body.join(0.0, upright(DVec2::new(0.0, middle), DVec2::new(HALF_BAY, far), thick, 5.3, 9.5));
@@ -197,21 +201,24 @@ fn mouldings(body: &mut Body) {
     body.paint = TRIM;
     body.group(Op::Join, 0.03);
     for (z, out, high) in [(8.68, 0.13, 0.09), (9.62, 0.15, 0.11)] {
-        body.join(0.0, block([-9.0, NAVE - out, z - high], [END, NAVE + 0.2, z + high], 0.05));
-        body.join(0.02, block([-9.0, NAVE - 0.55 * out, z - high - 0.08], [END, NAVE + 0.2, z], 0.03));
+        body.join(0.0, block([-9.0, NAVE_WALL_Y - out, z - high], [END_WALL_X, NAVE_WALL_Y + 0.2, z + high], 0.05));
+        body.join(
+            0.02,
+            block([-9.0, NAVE_WALL_Y - 0.55 * out, z - high - 0.08], [END_WALL_X, NAVE_WALL_Y + 0.2, z], 0.03),
+        );
     }
     for x in [0.0, 1.0, 2.0] {
-        let p = |z: f64| DVec3::new(x, NAVE - 0.02, z);
+        let p = |z: f64| DVec3::new(x, NAVE_WALL_Y - 0.02, z);
         body.join(0.01, Shape::cone(p(8.75), p(9.25), 0.055, 0.05));
         body.join(0.02, Shape::cone(p(9.25), p(9.33), 0.05, 0.10));
     }
-    body.join(0.0, block([-9.0, OUTER - 0.16, 1.62], [END, OUTER + 0.2, 1.78], 0.06));
-    body.join(0.0, block([-9.0, OUTER - 0.55, -0.2], [END, OUTER + 0.2, 0.46], 0.04));
+    body.join(0.0, block([-9.0, OUTER_WALL_Y - 0.16, 1.62], [END_WALL_X, OUTER_WALL_Y + 0.2, 1.78], 0.06));
+    body.join(0.0, block([-9.0, OUTER_WALL_Y - 0.55, -0.2], [END_WALL_X, OUTER_WALL_Y + 0.2, 0.46], 0.04));
     // Three shafts on a corbel over each column, with capitals at the springing.
     body.group(Op::Join, 0.03);
     for (dx, radius) in [(0.0, 0.17), (0.27, 0.11)] {
         for side in [-1.0, 1.0] {
-            let p = |z: f64| DVec3::new(HALF_BAY + side * dx, NAVE - 0.06, z);
+            let p = |z: f64| DVec3::new(HALF_BAY + side * dx, NAVE_WALL_Y - 0.06, z);
             body.join(0.02, Shape::cone(p(6.0), p(10.5), radius, radius * 0.96));
             for z in [8.68, 9.62] {
                 let at = Placement::at(p(z));
@@ -220,15 +227,21 @@ fn mouldings(body: &mut Body) {
             body.join(0.03, Shape::cone(p(10.35), p(10.72), radius, radius * 1.75));
         }
     }
-    let p = |z: f64| DVec3::new(HALF_BAY, NAVE - 0.05, z);
+    let p = |z: f64| DVec3::new(HALF_BAY, NAVE_WALL_Y - 0.05, z);
     body.join(0.05, Shape::cone(p(5.62), p(6.02), 0.06, 0.25));
-    body.join(0.02, block([HALF_BAY - 0.55, NAVE - 0.40, 10.74], [HALF_BAY + 0.55, NAVE + 0.2, 10.90], 0.04));
+    body.join(
+        0.02,
+        block([HALF_BAY - 0.55, NAVE_WALL_Y - 0.40, 10.74], [HALF_BAY + 0.55, NAVE_WALL_Y + 0.2, 10.90], 0.04),
+    );
     // Half columns on the outer wall.
     body.group(Op::Join, 0.03);
-    let p = |z: f64| DVec3::new(HALF_BAY, OUTER - 0.05, z);
+    let p = |z: f64| DVec3::new(HALF_BAY, OUTER_WALL_Y - 0.05, z);
     body.join(0.0, Shape::cone(p(0.0), p(5.0), 0.26, 0.25));
     body.join(0.03, Shape::cone(p(4.75), p(5.12), 0.25, 0.40));
-    body.join(0.02, block([HALF_BAY - 0.5, OUTER - 0.52, 5.13], [HALF_BAY + 0.5, OUTER + 0.2, 5.30], 0.04));
+    body.join(
+        0.02,
+        block([HALF_BAY - 0.5, OUTER_WALL_Y - 0.52, 5.13], [HALF_BAY + 0.5, OUTER_WALL_Y + 0.2, 5.30], 0.04),
+    );
     for z in [0.5, 0.66, 4.7] {
         body.join(0.02, Shape::Ring { at: Placement::at(p(z)), major: 0.27, minor: 0.06 });
     }
@@ -237,7 +250,7 @@ fn mouldings(body: &mut Body) {
 /// A round column with base, shaft, eight thin shafts around it and a capital of leaves.
 fn column(body: &mut Body) {
     body.paint = TRIM;
-    let p = |z: f64| DVec3::new(HALF_BAY, ARCADE, z);
+    let p = |z: f64| DVec3::new(HALF_BAY, ARCADE_Y, z);
     let drum = |radius: f64, low: f64, high: f64, round: f64| Shape::Cylinder {
         at: Placement::at(p(0.5 * (low + high))),
         radius,
@@ -245,7 +258,7 @@ fn column(body: &mut Body) {
         round,
     };
     let square = |half: f64, low: f64, high: f64, round: f64| {
-        block([HALF_BAY - half, ARCADE - half, low], [HALF_BAY + half, ARCADE + half, high], round)
+        block([HALF_BAY - half, ARCADE_Y - half, low], [HALF_BAY + half, ARCADE_Y + half, high], round)
     };
     body.group(Op::Join, 0.01);
     body.join(0.0, square(0.82, -0.2, 0.28, 0.03));
@@ -303,7 +316,7 @@ fn pews(body: &mut Body) {
 
 /// The end: steps, an altar with cross and candles, and a rose window above a blind arcade.
 fn end(body: &mut Body) {
-    let rose = DVec3::new(END, 0.0, 11.6);
+    let rose = DVec3::new(END_WALL_X, 0.0, 11.6);
     let facing = |origin: DVec3| Placement::along(origin, DVec3::X, DVec3::Y);
     body.group(Op::Cut, 0.03);
     body.paint = STONE;
@@ -311,7 +324,7 @@ fn end(body: &mut Body) {
         body.join(0.0, Shape::Cylinder { at: facing(rose), radius, half_height: depth, round: 0.0 });
     }
     for y in [0.62, 1.86, 3.10] {
-        let at = Placement { origin: DVec3::new(END, y, 2.6), axes: DMat3::from_rotation_z(FRAC_PI_2) };
+        let at = Placement { origin: DVec3::new(END_WALL_X, y, 2.6), axes: DMat3::from_rotation_z(FRAC_PI_2) };
         body.join(0.0, Shape::Passage { at, half_width: 0.5, spring: 2.6, radius: 0.75, half_length: 0.3 });
     }
     body.group(Op::Join, 0.0);
@@ -338,10 +351,10 @@ fn end(body: &mut Body) {
             body.join(0.01, Shape::Ring { at: facing(leaf), major: 0.17, minor: 0.03 });
         }
     }
-    body.join(0.0, block([END - 0.14, -1.0, 7.75], [END + 0.2, NAVE + 0.1, 7.95], 0.05));
-    body.join(0.0, block([END - 0.12, -1.0, 2.38], [END + 0.2, NAVE + 0.1, 2.55], 0.05));
+    body.join(0.0, block([END_WALL_X - 0.14, -1.0, 7.75], [END_WALL_X + 0.2, NAVE_WALL_Y + 0.1, 7.95], 0.05));
+    body.join(0.0, block([END_WALL_X - 0.12, -1.0, 2.38], [END_WALL_X + 0.2, NAVE_WALL_Y + 0.1, 2.55], 0.05));
     for y in [0.0, 1.24, 2.48, 3.72] {
-        let p = |z: f64| DVec3::new(END - 0.02, y, z);
+        let p = |z: f64| DVec3::new(END_WALL_X - 0.02, y, z);
         body.join(0.01, Shape::cone(p(2.5), p(5.1), 0.075, 0.07));
         body.join(0.03, Shape::cone(p(5.05), p(5.2), 0.075, 0.14));
     }
@@ -353,7 +366,7 @@ fn altar(body: &mut Body) {
     body.paint = TRIM;
     for (i, x) in [3.9, 4.3, 4.7].into_iter().enumerate() {
         let top = 0.17 * (i as f64 + 1.0);
-        body.join(0.0, block([x, -5.0, -0.2], [END + 0.1, 4.3 - 0.4 * i as f64, top], 0.02));
+        body.join(0.0, block([x, -5.0, -0.2], [END_WALL_X + 0.1, 4.3 - 0.4 * i as f64, top], 0.02));
     }
     body.join(0.0, block([5.6, -1.6, 0.4], [6.5, 1.6, 1.42], 0.03));
     body.join(0.0, block([5.5, -1.75, 1.40], [6.6, 1.75, 1.54], 0.03));

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 use super::body::{Body, Op};
 use super::fold::Fold;
-use super::head::{Looks, head};
+use super::head::{HeadColors, head};
 use super::horse::{Coat, Gait, horse};
 use super::limb::{Hand, foot, hand, pulse, reach};
 use super::octree::Octree;
@@ -25,7 +25,7 @@ pub(super) fn scene(phase: f64) -> Model {
     let mut body = Body::new(SKIN);
     dancer(&mut body, phase);
     let tree = Octree::new(body, Fold::None, DVec3::new(-1.2, -1.2, -0.1), 2.4, 8);
-    Model { tree, points: Points::Strewn(vec![1.0]) }
+    Model { tree, points: Points::Sampled(vec![1.0]) }
 }
 
 /// A small horse on the head of a large one, with as many points on each.
@@ -41,7 +41,7 @@ pub(super) fn two_scales() -> Model {
     body.frame = frame(crown, -0.9, 0.16);
     horse(&mut body, Gait::Standing, Coat::GREY);
     let tree = Octree::new(body, Fold::None, DVec3::new(-1.9, -1.8, -0.2), 3.6, 9);
-    Model { tree, points: Points::Strewn(vec![0.5, 0.5]) }
+    Model { tree, points: Points::Sampled(vec![0.5, 0.5]) }
 }
 
 fn dancer(body: &mut Body, phase: f64) {
@@ -69,7 +69,7 @@ fn dancer(body: &mut Body, phase: f64) {
     body.group(Op::Join, 0.03);
     body.paint = SKIN;
     body.join(0.0, Shape::cone(neck - DVec3::Z * 0.03, middle + turn * DVec3::new(0.0, 0.025, -0.06), 0.058, 0.05));
-    let looks = Looks {
+    let looks = HeadColors {
         skin: SKIN,
         lips: Paint::Plain(176, 98, 88),
         eyes: Paint::Plain(232, 226, 216),

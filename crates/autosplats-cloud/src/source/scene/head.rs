@@ -8,7 +8,7 @@ use super::shape::{Placement, Shape};
 
 /// The colours of a head.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Looks {
+pub(super) struct HeadColors {
     pub(super) skin: Paint,
     pub(super) lips: Paint,
     pub(super) eyes: Paint,
@@ -17,7 +17,7 @@ pub(super) struct Looks {
 }
 
 /// Joins a bald head, 23 cm high, to the group. The placement's origin is its centre; it looks along local -y.
-pub(super) fn head(body: &mut Body, at: Placement, looks: Looks) {
+pub(super) fn head(body: &mut Body, at: Placement, looks: HeadColors) {
     let p = |x: f64, y: f64, z: f64| at.world(DVec3::new(x, y, z));
     let egg = |x: f64, y: f64, z: f64, radii: [f64; 3]| {
         let origin = at.world(DVec3::new(x, y, z));

@@ -44,5 +44,5 @@ pub(super) fn scene(phase: f64) -> Model {
     }
     let tree = Octree::new(body, Fold::None, DVec3::new(-8.0, -8.0, -4.0), 16.0, 9);
     // The meadow needs fewer points than the horses.
-    Model { tree, points: Points::Strewn(vec![0.22, 0.78]) }
+    Model { tree, points: Points::Sampled(vec![0.22, 0.78]) }
 }

@@ -55,7 +55,7 @@ struct Model {
 #[derive(Debug)]
 enum Points {
     /// Sampled evenly on each zone. The values are the zones' shares of the points.
-    Strewn(Vec<f64>),
+    Sampled(Vec<f64>),
     /// Scanned from these positions.
     Scanned(Vec<DVec3>),
 }
@@ -165,7 +165,7 @@ impl Scene {
         let (mut positions, mut colors) = (vec![[0.0; 3]; count], vec![[0; 3]; count]);
         let Model { tree, points } = self.model();
         let finished = match points {
-            Points::Strewn(shares) => sample::strew(tree, shares, &mut positions, &mut colors, progress),
+            Points::Sampled(shares) => sample::sample_surface(tree, shares, &mut positions, &mut colors, progress),
             Points::Scanned(stations) => scan::scan(tree, stations, &mut positions, &mut colors, progress),
         };
         if !finished {

@@ -18,8 +18,8 @@ use super::fold::Fold;
 const SHORT_LIST: usize = 4;
 
 /// Level of the lookup table that replaces the upper levels of the tree.
-const TOP: u32 = 5;
-const MASK: u32 = (1 << TOP) - 1;
+const TABLE_LEVEL: u32 = 5;
+const TABLE_MASK: u32 = (1 << TABLE_LEVEL) - 1;
 
 #[derive(Clone, Copy, Debug)]
 enum Cell {
@@ -52,7 +52,7 @@ pub(super) struct Octree {
     depth: u32,
     cells: Vec<Cell>,
     lists: Vec<u16>,
-    /// Deepest cell that contains each cube of level [`TOP`], ordered by z, y, x, and the level of that cell.
+    /// Deepest cell that contains each cube of level [`TABLE_LEVEL`], ordered by z, y, x, and the level of that cell.
     top: Vec<(u32, u32)>,
 }
 
@@ -134,16 +134,18 @@ impl Octree {
             lists.extend(part_lists);
         }
         let mut tree = Self { body, fold, min, size, depth, cells, lists, top: Vec::new() };
-        tree.top = (0..1_u32 << (3 * TOP)).map(|i| tree.descend(i & MASK, (i >> TOP) & MASK, i >> (2 * TOP))).collect();
+        tree.top = (0..1_u32 << (3 * TABLE_LEVEL))
+            .map(|i| tree.descend(i & TABLE_MASK, (i >> TABLE_LEVEL) & TABLE_MASK, i >> (2 * TABLE_LEVEL)))
+            .collect();
         tree
     }
 
-    /// The cell at a cube of level [`TOP`], and its level.
+    /// The cell at a cube of level [`TABLE_LEVEL`], and its level.
     fn descend(&self, x: u32, y: u32, z: u32) -> (u32, u32) {
         let (mut cell, mut level) = (0, 0);
-        while let (Cell::Branch(children), true) = (self.cells[cell as usize], level < TOP) {
+        while let (Cell::Branch(children), true) = (self.cells[cell as usize], level < TABLE_LEVEL) {
             level += 1;
-            let bit = TOP - level;
+            let bit = TABLE_LEVEL - level;
             cell = children + child_at(x, y, z, bit);
         }
         (cell, level)
@@ -182,8 +184,9 @@ impl Octree {
         let steps = f64::from(1_u32 << self.depth);
         let q = ((p - self.min) * (steps / self.size)).clamp(DVec3::ZERO, DVec3::splat(steps - 1.0));
         let (x, y, z) = (q.x as u32, q.y as u32, q.z as u32);
-        let shift = self.depth - TOP;
-        let (cell, level) = self.top[((((z >> shift) << TOP | (y >> shift)) << TOP) | (x >> shift)) as usize];
+        let shift = self.depth - TABLE_LEVEL;
+        let (cell, level) =
+            self.top[((((z >> shift) << TABLE_LEVEL | (y >> shift)) << TABLE_LEVEL) | (x >> shift)) as usize];
         let (mut cell, mut bit) = (cell as usize, self.depth - level);
         while let Cell::Branch(children) = self.cells[cell] {
             bit -= 1;

@@ -82,7 +82,7 @@ impl Zone {
     }
 
     /// Samples `need` points of this zone, or fewer if the zone has no surface.
-    fn fill(&self, tree: &Octree, zone: usize, need: usize, random: &mut Random) -> Vec<Painted> {
+    fn fill(&self, tree: &Octree, zone: usize, need: usize, random: &mut Random) -> Vec<PaintedPoint> {
         let mut points = Vec::new();
         // Lines per point: a guess, corrected by the crossings found so far.
         let (mut lines, mut met) = (0, 0);
@@ -104,7 +104,7 @@ impl Zone {
 }
 
 /// Samples a share `shares[zone]` of the points on each zone. Returns false if cancelled or if a zone has no surface.
-pub(super) fn strew(
+pub(super) fn sample_surface(
     tree: &Octree,
     shares: &[f64],
     positions: &mut [[f32; 3]],
@@ -138,10 +138,10 @@ pub(super) fn strew(
     })
 }
 
-type Painted = ([f32; 3], [u8; 3]);
+type PaintedPoint = ([f32; 3], [u8; 3]);
 
 /// Sends one random line through `leaf` and keeps its crossings in `zone`.
-fn pierce(tree: &Octree, (leaf, octants): &(Leaf, u8), zone: usize, random: &mut Random, out: &mut Vec<Painted>) {
+fn pierce(tree: &Octree, (leaf, octants): &(Leaf, u8), zone: usize, random: &mut Random, out: &mut Vec<PaintedPoint>) {
     let axis = random.below(3);
     let (mut origin, mut octant) = (leaf.min, 0);
     for other in [(axis + 1) % 3, (axis + 2) % 3] {

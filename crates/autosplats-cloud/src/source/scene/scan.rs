@@ -9,7 +9,7 @@ use super::sample::{Progress, by_blocks, quantize};
 use crate::random::Random;
 
 /// Lowest elevation of a ray, in radians; the tripod hides everything below.
-const LOWEST: f64 = -60.0 / 180.0 * std::f64::consts::PI;
+const MIN_ELEVATION_RAD: f64 = -60.0 / 180.0 * std::f64::consts::PI;
 
 /// Scans the inside of a closed scene, with an equal share of the points from each of `stations`. Rays are jittered
 /// within equal steps of azimuth and elevation. Returns false if cancelled or if rays leave the scene.
@@ -22,7 +22,7 @@ pub(super) fn scan(
 ) -> bool {
     let per_station = positions.len().div_ceil(stations.len()).max(1);
     // The scanner measures one vertical profile after another while its head turns.
-    let profile = ((per_station as f64 * (FRAC_PI_2 - LOWEST) / TAU).sqrt().ceil() as usize).max(1);
+    let profile = ((per_station as f64 * (FRAC_PI_2 - MIN_ELEVATION_RAD) / TAU).sqrt().ceil() as usize).max(1);
     by_blocks(positions, colors, progress, |first, points, colors| {
         for (i, (point, color)) in (first..).zip(points.iter_mut().zip(colors)) {
             let mut random = Random::of_scene(i as u64);
@@ -30,7 +30,7 @@ pub(super) fn scan(
             let hit = (0..100).find_map(|_| {
                 let azimuth = TAU * ((ray / profile) as f64 + random.unit()) / per_station.div_ceil(profile) as f64;
                 let height = ((ray % profile) as f64 + random.unit()) / profile as f64;
-                let elevation = LOWEST + (FRAC_PI_2 - LOWEST) * height;
+                let elevation = MIN_ELEVATION_RAD + (FRAC_PI_2 - MIN_ELEVATION_RAD) * height;
                 let (sin, cos) = azimuth.sin_cos();
                 let direction = DVec3::new(cos * elevation.cos(), sin * elevation.cos(), elevation.sin());
                 tree.trace(stations[station], direction, 0.0..f64::INFINITY)

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 use super::body::{Body, Op};
 use super::fold::Fold;
-use super::head::{Looks, head};
+use super::head::{HeadColors, head};
 use super::limb::{Hand, foot, hand, reach};
 use super::octree::Octree;
 use super::paint::{Paint, lattice};
@@ -28,7 +28,7 @@ pub(super) fn scene() -> Model {
     body.frame = Similarity { placement: Placement::at(DVec3::new(0.0, 0.0, 0.98)), scale: 1.12 };
     figure(&mut body);
     let tree = Octree::new(body, Fold::None, DVec3::new(-1.7, -1.7, -0.1), 3.4, 8);
-    Model { tree, points: Points::Strewn(vec![1.0]) }
+    Model { tree, points: Points::Sampled(vec![1.0]) }
 }
 
 fn figure(body: &mut Body) {
@@ -40,12 +40,12 @@ fn figure(body: &mut Body) {
     body.group(Op::Join, 0.015);
     body.join(0.0, Shape::cone(NECK - DVec3::Z * 0.05, middle + turn * DVec3::new(0.0, 0.03, -0.05), 0.062, 0.055));
     let at = Placement { origin: middle, axes: turn };
-    head(body, at, Looks { skin: STONE, lips: STONE, eyes: STONE, irises: STONE, brows: STONE });
+    head(body, at, HeadColors { skin: STONE, lips: STONE, eyes: STONE, irises: STONE, brows: STONE });
     curls(body, at);
 }
 
 /// A fixed pseudo-random number from -1 to 1.
-fn whim(i: i32, salt: i64) -> f64 {
+fn jitter(i: i32, salt: i64) -> f64 {
     f64::from(lattice(i64::from(i), salt, 77)) * 2.0 - 1.0
 }
 
@@ -72,7 +72,7 @@ fn robe(body: &mut Body) {
     body.group(Op::Join, 0.022);
     const FOLDS: i32 = 34;
     for i in 0..FOLDS {
-        let angle = TAU * (f64::from(i) + 0.3 * whim(i, 1)) / f64::from(FOLDS);
+        let angle = TAU * (f64::from(i) + 0.3 * jitter(i, 1)) / f64::from(FOLDS);
         let (sin, cos) = angle.sin_cos();
         let at = |rx: f64, ry: f64, z: f64, lag: f64| {
             let (s, c) = (angle + lag).sin_cos();
@@ -80,23 +80,23 @@ fn robe(body: &mut Body) {
         };
         // The folds part over the free leg, front left.
         let part = (-(angle - 4.25) * (angle - 4.25) * 3.0).exp();
-        let deep = 0.75 + 0.35 * whim(i, 2);
+        let deep = 0.75 + 0.35 * jitter(i, 2);
         let push = -0.07 * part;
         let points = [
             (at(0.128, 0.098, 1.075, 0.0), 0.010),
-            (at(0.175, 0.132, 0.93, 0.02 * whim(i, 3)), 0.014 * deep),
-            (at(0.190, 0.142, 0.72 + 0.05 * whim(i, 12), 0.04 * whim(i, 4)) + DVec3::Y * push, 0.019 * deep),
-            (at(0.207, 0.162, 0.45 + 0.06 * whim(i, 13), 0.07 * whim(i, 5)) + DVec3::Y * push, 0.023 * deep),
-            (at(0.235, 0.196, 0.20 + 0.04 * whim(i, 14), 0.09 * whim(i, 6)), 0.028 * deep),
-            (at(0.270, 0.235, 0.035, 0.10 * whim(i, 7)) + DVec3::new(cos, sin, 0.0) * 0.015, 0.033 * deep),
+            (at(0.175, 0.132, 0.93, 0.02 * jitter(i, 3)), 0.014 * deep),
+            (at(0.190, 0.142, 0.72 + 0.05 * jitter(i, 12), 0.04 * jitter(i, 4)) + DVec3::Y * push, 0.019 * deep),
+            (at(0.207, 0.162, 0.45 + 0.06 * jitter(i, 13), 0.07 * jitter(i, 5)) + DVec3::Y * push, 0.023 * deep),
+            (at(0.235, 0.196, 0.20 + 0.04 * jitter(i, 14), 0.09 * jitter(i, 6)), 0.028 * deep),
+            (at(0.270, 0.235, 0.035, 0.10 * jitter(i, 7)) + DVec3::new(cos, sin, 0.0) * 0.015, 0.033 * deep),
         ];
         body.strand(0.02, &points);
     }
     // Cloth that breaks on the ground.
     for i in 0..22 {
-        let angle = TAU * (f64::from(i) + 0.4 * whim(i, 8)) / 22.0;
+        let angle = TAU * (f64::from(i) + 0.4 * jitter(i, 8)) / 22.0;
         let (sin, cos) = angle.sin_cos();
-        let out = 0.27 + 0.03 * whim(i, 9);
+        let out = 0.27 + 0.03 * jitter(i, 9);
         let p = DVec3::new(out * cos, 0.015 + 0.87 * out * sin, 0.02);
         let q = p + DVec3::new(-sin, cos, 0.0) * 0.06 + DVec3::new(cos, sin, 0.0) * 0.02;
         body.join(0.02, Shape::cone(p, q, 0.028, 0.02));
@@ -111,11 +111,11 @@ fn robe(body: &mut Body) {
     // The blouse above the girdle, with thin folds that gather under the chest, and the girdle itself.
     body.group(Op::Join, 0.012);
     for i in 0..26 {
-        let angle = TAU * (f64::from(i) + 0.35 * whim(i, 10)) / 26.0;
+        let angle = TAU * (f64::from(i) + 0.35 * jitter(i, 10)) / 26.0;
         let (sin, cos) = angle.sin_cos();
         let lower = WAIST + DVec3::new(0.126 * cos, 0.099 * sin, -0.005);
         let bulge = WAIST + DVec3::new(0.139 * cos, 0.112 * sin, 0.055);
-        let upper = CHEST + DVec3::new(0.128 * cos, 0.094 * sin - 0.012 * (1.0 - sin), -0.035 + 0.02 * whim(i, 11));
+        let upper = CHEST + DVec3::new(0.128 * cos, 0.094 * sin - 0.012 * (1.0 - sin), -0.035 + 0.02 * jitter(i, 11));
         body.strand(0.012, &[(lower, 0.012), (bulge, 0.0125), (upper, 0.006)]);
     }
     body.group(Op::Join, 0.004);
@@ -138,8 +138,8 @@ fn mantle(body: &mut Body) {
     body.group(Op::Join, 0.010);
     for i in 0..5 {
         let s = f64::from(i) / 4.0;
-        let sag = 0.012 * whim(i, 20);
-        let deep = 1.0 + 0.25 * whim(i, 23);
+        let sag = 0.012 * jitter(i, 20);
+        let deep = 1.0 + 0.25 * jitter(i, 23);
         let points = [
             (DVec3::new(0.185 - 0.05 * s, 0.07 - 0.03 * s, 1.43 + 0.035 * s), 0.0125 * deep),
             (DVec3::new(0.165 - 0.075 * s, -0.07, 1.435 - 0.01 * s), 0.0115 * deep),
@@ -177,7 +177,7 @@ fn mantle(body: &mut Body) {
     }
     for i in 0..15 {
         let s = f64::from(i) / 14.0 * 2.0 - 1.0;
-        let wave = 0.012 * whim(i, 21);
+        let wave = 0.012 * jitter(i, 21);
         // Ridges and hollows alternate.
         let ridge = if i % 2 == 0 { 0.014 } else { -0.010 };
         let points = [
@@ -211,17 +211,17 @@ fn arms(body: &mut Body) {
         let along = (elbow - shoulder).normalize();
         for i in 0..9 {
             let s = f64::from(i) / 8.0;
-            let tilt = along + DVec3::new(0.25 * whim(i, 30 + side as i64), 0.25 * whim(i, 33), 0.0);
+            let tilt = along + DVec3::new(0.25 * jitter(i, 30 + side as i64), 0.25 * jitter(i, 33), 0.0);
             let at = Placement::along(shoulder.lerp(elbow, 0.12 + 0.74 * s), tilt, DVec3::X);
-            body.join(0.012, Shape::Ring { at, major: 0.047 - 0.004 * s, minor: 0.0125 + 0.003 * whim(i, 31) });
+            body.join(0.012, Shape::Ring { at, major: 0.047 - 0.004 * s, minor: 0.0125 + 0.003 * jitter(i, 31) });
         }
         for i in 0..7 {
             let s = f64::from(i) / 6.0 - 0.5;
             let top = shoulder.lerp(elbow, 0.86) + DVec3::new(0.05 * s, 0.10 * s, -0.02);
-            let low = top + DVec3::new(0.02 * side + 0.03 * s, 0.05 * s, -0.17 - 0.03 * whim(i, 32));
+            let low = top + DVec3::new(0.02 * side + 0.03 * s, 0.05 * s, -0.17 - 0.03 * jitter(i, 32));
             body.strand(
                 0.012,
-                &[(top, 0.018), (top.lerp(low, 0.5) + DVec3::Y * 0.012 * whim(i, 34), 0.018), (low, 0.014)],
+                &[(top, 0.018), (top.lerp(low, 0.5) + DVec3::Y * 0.012 * jitter(i, 34), 0.018), (low, 0.014)],
             );
         }
         body.group(Op::Join, 0.012);
@@ -317,9 +317,9 @@ fn curls(body: &mut Body, at: Placement) {
         }
         let root = at.world(DVec3::new(0.0, 0.024, 0.035) + out * DVec3::new(0.083, 0.096, 0.09));
         let n = at.axes * out;
-        let curl = Placement::along(root, n + 0.35 * DVec3::new(whim(i, 40), whim(i, 41), whim(i, 42)), DVec3::X);
-        let turn = whim(i, 43) * 3.0;
-        let big = 1.0 + 0.2 * whim(i, 44);
+        let curl = Placement::along(root, n + 0.35 * DVec3::new(jitter(i, 40), jitter(i, 41), jitter(i, 42)), DVec3::X);
+        let turn = jitter(i, 43) * 3.0;
+        let big = 1.0 + 0.2 * jitter(i, 44);
         let points = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0].map(|k: f64| {
             let (sin, cos) = (turn + 1.25 * k).sin_cos();
             let radius = big * (0.0150 - 0.0015 * k);

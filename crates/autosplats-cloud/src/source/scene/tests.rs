@@ -34,7 +34,7 @@ fn all() -> impl Iterator<Item = &'static Scene> {
 fn eye(scene: &Scene, random: &mut Random) -> DVec3 {
     match &scene.model().points {
         Points::Scanned(stations) => stations[random.below(stations.len())],
-        Points::Strewn(_) => sphere(random) * 12.0 + DVec3::Z,
+        Points::Sampled(_) => sphere(random) * 12.0 + DVec3::Z,
     }
 }
 
@@ -194,7 +194,7 @@ fn names_counts_and_times_are_read() {
 }
 
 #[test]
-fn points_are_strewn_evenly() {
+fn points_are_sampled_evenly() {
     // A ball, and a block far from it that is rotated against the cells. Expected counts follow from the areas.
     let (radius, half) = (0.7, DVec3::new(0.9, 0.5, 0.25));
     let turned = Placement::along(DVec3::new(-1.1, -1.2, -1.3), DVec3::new(0.3, 0.5, 0.8), DVec3::new(1.0, -0.2, 0.1));
@@ -205,7 +205,7 @@ fn points_are_strewn_evenly() {
     let tree = Octree::new(body, Fold::None, DVec3::splat(-3.0), 6.0, 7);
     let count = 300_000;
     let (mut positions, mut colors) = (vec![[0.0; 3]; count], vec![[0; 3]; count]);
-    assert!(sample::strew(&tree, &[1.0], &mut positions, &mut colors, &|_| true), "the body is strewn");
+    assert!(sample::sample_surface(&tree, &[1.0], &mut positions, &mut colors, &|_| true), "the body is strewn");
 
     let ball = 4.0 * std::f64::consts::PI * radius * radius;
     let faces = [half.y * half.z, half.x * half.z, half.x * half.y].map(|quarter| 4.0 * quarter);
