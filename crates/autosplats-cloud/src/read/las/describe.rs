@@ -1,13 +1,7 @@
 //! Describes a file by its header and variable length records.
 
 use super::super::{Attribute, Description, Job};
-use super::{
-    columns::{Source, bytes_at},
-    coordinates, dimensions,
-    header::Header,
-    laz,
-    records::Records,
-};
+use super::{columns::bytes_at, coordinates, dimension::Source, dimensions, header::Header, laz, records::Records};
 use crate::{Error, las};
 
 /// Bytes of the COPC info record.

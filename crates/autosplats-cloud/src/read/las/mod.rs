@@ -12,6 +12,7 @@
 mod columns;
 mod coordinates;
 mod describe;
+mod dimension;
 mod extra;
 mod gps_time;
 mod header;
@@ -22,7 +23,8 @@ mod records;
 use glam::DVec3;
 
 use self::{
-    columns::{Columns, Dimension, Source},
+    columns::Columns,
+    dimension::{Dimension, Source},
     header::Header,
     laz::Compressed,
     records::Records,
