@@ -1,63 +1,64 @@
-//! What is truly there at each pixel.
+//! The true surface at each pixel.
 
 use anyhow::Result;
 use autosplats::Camera;
 use autosplats::cloud::glam::DVec3;
 use rayon::prelude::*;
 
-use crate::picture::Shown;
+use crate::picture::{Picture, Shown};
+use crate::rays::Rays;
 use crate::subject::Subject;
-use crate::view::Rays;
 
-/// Widest spacing of points, in pixels, that counts as sampled.
+/// Greatest spacing of points that counts as sampled, pixels.
 const WIDEST_SPACING_PX: f64 = 1.5;
-/// Of the k points around a place, this many must lie within 30° of its tangent plane for it to count as sampled: those
-/// on another side of an edge, which a scanner may see alone, tell nothing about this one.
+/// Fewest of a place's nearest points within 30° of its tangent plane that make the place count as sampled. Points
+/// beyond an edge do not sample this side of the edge, which a scanner may not have seen.
 const LEAST_BESIDE: usize = 3;
-/// Cosine of the steepest slant that widens the tolerance in depth.
+/// Least cosine between line of sight and normal from which the tolerance in depth is computed.
 const STEEPEST: f64 = 0.1;
-/// How near a surface must be that is taken for one that the sensor of a sweep does not see, as a share of the diagonal.
+/// Tolerance in depth where the lidar does not see the surface, as a share of the subject's diagonal.
 const UNSEEN: f64 = 0.01;
-/// Pixels from a silhouette within which normals are judged once more.
+/// Greatest distance from a silhouette, in pixels, at which a pixel belongs to the band.
 const BAND_PX: usize = 4;
-/// Steps in depth below this many pixels are no silhouettes.
+/// Least step in depth that may be a silhouette, pixels.
 const LEAST_STEP_PX: f64 = 4.0;
 
 /// The true surface at a pixel's centre.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// Along the viewing axis.
+    /// Depth along the viewing axis.
     pub depth: f64,
-    /// World space, towards the eye.
+    /// Unit normal in world space, towards the eye.
     pub normal: DVec3,
-    /// Mean distance in pixels of the points around; of swept ones the distance along the ring or across, whichever is the
-    /// longer, and infinite where the sensor sees nothing.
+    /// Mean spacing of the points around, pixels. For a lidar the spacing along or across rings, whichever is longer,
+    /// and infinite where the lidar does not see the surface.
     pub spacing_px: f64,
-    /// Of swept points, whether the sensor sees this place.
+    /// Whether the lidar sees this place. `None` for sampled points.
     pub swept: Option<bool>,
-    /// Whether there are points enough for a closed picture of this place: elsewhere limits do not hold.
+    /// Whether points are dense enough for a closed picture. Limits hold only there.
     pub sampled: bool,
-    /// Difference in depth within which a surface is the same: the radius of the ball that holds k points, or the distance
-    /// of swept ones, what a slanted surface goes back within a pixel, and how far points lie off the surface.
+    /// Greatest difference in depth that counts as the same surface, a sum of three terms. The first is the distance to
+    /// the k-th nearest point, or a lidar's spacing. The others are a slanted surface's depth within a pixel, and
+    /// [`Subject::blur`].
     pub tolerance: f64,
 }
 
-/// The true picture, row by row.
+/// The true picture, in rows of pixels.
 #[derive(Clone, Debug)]
 pub struct Exact {
-    /// Pixels in a row.
+    /// Number of pixels in a row.
     pub width: usize,
-    /// The lines of sight.
+    /// The picture's lines of sight.
     pub rays: Rays,
-    /// What each pixel shows.
+    /// The surface at each pixel's centre. `None` where no surface is.
     pub seen: Vec<Option<Seen>>,
 }
 
 impl Exact {
-    /// Sends one ray through the centre of each pixel.
+    /// Traces one ray through the centre of each pixel.
     ///
     /// # Errors
-    /// A camera that cannot see.
+    /// An invalid camera.
     pub fn trace(subject: &Subject, camera: &Camera, size: [u32; 2]) -> Result<Self> {
         Self::trace_with(subject, camera, size, |seen, place, direction, pixel_size| {
             let (spacing, reach, all_around) = match &subject.recipe.sweep {
@@ -84,15 +85,16 @@ impl Exact {
         })
     }
 
-    /// The same without asking where points are: depths and normals only.
+    /// Traces depths and normals alone, without the spacing of points.
     ///
     /// # Errors
-    /// A camera that cannot see.
+    /// An invalid camera.
     pub fn trace_alone(subject: &Subject, camera: &Camera, size: [u32; 2]) -> Result<Self> {
         Self::trace_with(subject, camera, size, |seen, _, _, _| seen)
     }
 
-    /// Sends the rays; `about` adds what is to be known of a place from its direction and the size of a pixel there.
+    /// Traces the rays. `about` completes each surface, given its place, the ray's direction and the size of a pixel
+    /// there.
     fn trace_with(
         subject: &Subject,
         camera: &Camera,
@@ -112,17 +114,17 @@ impl Exact {
         Ok(Self { width: width as usize, rays, seen })
     }
 
-    /// Pixels in a column.
+    /// Number of pixels in a column.
     pub fn height(&self) -> usize {
         self.seen.len() / self.width
     }
 
-    /// Whether anything is asked about a pixel: not where there is a surface that the sensor of a sweep does not see.
+    /// Whether a pixel is measured. Pixels of a surface that the lidar does not see are not.
     pub fn is_asked(&self, pixel: usize) -> bool {
         self.seen[pixel].is_none_or(|seen| seen.swept != Some(false))
     }
 
-    /// Whether a point shown is one of a sampled surface. An outlier is none, but should not be seen.
+    /// Whether a drawn point lies where points are dense enough. Outliers count as such: they should not be visible.
     pub fn is_sampled(&self, shown: &Shown, subject: &Subject) -> bool {
         if subject.is_outlier(shown.point) {
             return true;
@@ -135,7 +137,7 @@ impl Exact {
         spacing <= WIDEST_SPACING_PX * self.rays.pixel_size(shown.depth)
     }
 
-    /// The true surface at the pixels of the picture that lie at most `reach` pixels from `index` in x and in y.
+    /// The true surface at all pixels at most `reach` pixels from `index` in x and in y.
     pub fn around(&self, index: usize, reach: usize) -> impl Iterator<Item = Option<&Seen>> {
         self.beside(index, reach).map(|pixel| self.seen[pixel].as_ref())
     }
@@ -147,14 +149,14 @@ impl Exact {
         range(y, height).flat_map(move |y| range(x, width).map(move |x| y * width + x))
     }
 
-    /// The pixels near a silhouette: near an end of the surface or a step from one part of it to another behind.
+    /// Whether each pixel lies near a silhouette: near an end of the surface, or near a step in depth.
     pub fn band(&self) -> Vec<bool> {
         let steps: Vec<bool> = (0..self.seen.len()).map(|pixel| self.is_step(pixel)).collect();
         let near = |pixel: usize| self.seen[pixel].is_some() && self.beside(pixel, BAND_PX).any(|near| steps[near]);
         (0..self.seen.len()).into_par_iter().map(near).collect()
     }
 
-    /// Whether there is a step between a pixel and the one right of it or below it.
+    /// Whether a silhouette lies between a pixel and the next one to the right or below.
     fn is_step(&self, pixel: usize) -> bool {
         let [x, y] = [pixel % self.width, pixel / self.width];
         let right = (x + 1 < self.width).then_some((pixel + 1, [1.0, 0.0]));
@@ -166,13 +168,13 @@ impl Exact {
         })
     }
 
-    /// Whether two pixels beside each other show no common surface: neither's tangent plane leads to the other.
+    /// Whether two neighbouring pixels show different surfaces: neither's tangent plane leads to the other.
     fn is_torn(&self, here: &Seen, there: &Seen, [x, y]: [f64; 2]) -> bool {
         let jump = there.depth - here.depth;
         let unit = self.rays.pixel_size(here.depth.min(there.depth));
         let rise = |seen: &Seen| {
             let normal = self.rays.turned(seen.normal);
-            // How much deeper the plane is a pixel on.
+            // Growth of the plane's depth towards the other pixel.
             if normal.z == 0.0 { f64::INFINITY } else { -(normal.x * x + normal.y * y) / normal.z * unit }
         };
         let is_off = |seen: &Seen| !((jump - rise(seen)).abs() <= 0.5 * jump.abs());
@@ -180,12 +182,21 @@ impl Exact {
     }
 }
 
-/// The farthest of some offsets, ascending.
+impl Picture {
+    /// The true picture, as a method without errors would draw it.
+    pub fn truth(exact: &Exact) -> Self {
+        let show =
+            |seen: &Option<Seen>| seen.map(|seen| Shown { depth: seen.depth, normal: seen.normal, point: u32::MAX });
+        Self { width: exact.width, shown: exact.seen.iter().map(show).collect() }
+    }
+}
+
+/// Length of the last offset, which is the longest.
 fn reach(offsets: &[DVec3]) -> f64 {
     offsets.last().map_or(f64::INFINITY, |farthest| farthest.length())
 }
 
-/// Mean distance between points that lie at these offsets, ascending, on a surface.
+/// Mean spacing of points on a surface, from their offsets in ascending order.
 fn spacing(offsets: &[DVec3]) -> f64 {
     reach(offsets) * (std::f64::consts::PI / offsets.len() as f64).sqrt()
 }

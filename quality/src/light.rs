@@ -1,29 +1,29 @@
-//! The light that pictures are compared in: the renderer's own, over any depths and normals.
+//! Lighting of pictures for comparisons: the renderer's own, for given depths and normals.
 
 use autosplats::cloud::glam::DVec3;
 use autosplats::{Background, ColorMode, GBuffer, Image, Shading, shade_layers};
 use rayon::prelude::*;
 
 use crate::picture::Picture;
-use crate::view::Rays;
+use crate::rays::Rays;
 
-/// What is seen where no surface is, sRGB.
+/// Colour of the background, sRGB.
 pub const BACKGROUND: [u8; 3] = [36, 41, 48];
 
-/// A lit picture, row by row.
+/// A lit picture, in rows of pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lit {
-    /// Pixels in a row.
+    /// Number of pixels in a row.
     pub width: usize,
-    /// sRGB, 0 to 1; nothing where no surface is.
+    /// Colours of covered pixels, sRGB, 0 to 1.
     pub pixels: Vec<Option<[f64; 3]>>,
-    /// What is seen where no surface is: the background, with a part of the surface beside it at edges.
+    /// Colours of all pixels, sRGB, 0 to 1: at edges the background is mixed with the surface beside it.
     around: Vec<[f64; 3]>,
 }
 
 impl Lit {
-    /// Lights `picture` in one clay tone. Pixels without a normal are lit as if they faced the eye, with occlusion to show
-    /// the shape, as viewers of dots do.
+    /// Lights `picture` in one clay tone. Pixels without a normal are lit as if they faced the eye; occlusion shows the
+    /// shape, as in viewers that draw dots.
     pub fn new(picture: &Picture, rays: &Rays) -> Self {
         let [width, height] = [picture.width, picture.height()];
         let mut layers = GBuffer::new(width as u32, height as u32);
@@ -37,11 +37,11 @@ impl Lit {
         }
         let background = Background::Color(BACKGROUND);
         let shading = Shading { color: ColorMode::Plain, background, ..Shading::default() };
-        let image = shade_layers(&layers, &rays.camera, &shading).expect("layers of a picture that was rendered");
+        let image = shade_layers(&layers, &rays.camera, &shading).expect("layers have the picture's size");
         Self::of(&image, picture)
     }
 
-    /// What the renderer made of `picture` itself, over [`BACKGROUND`].
+    /// The image that the renderer lit itself, over [`BACKGROUND`]. `picture` says which pixels are covered.
     pub fn of(image: &Image, picture: &Picture) -> Self {
         let width = picture.width;
         let around: Vec<[f64; 3]> =
@@ -50,17 +50,18 @@ impl Lit {
         Self { width, pixels, around }
     }
 
-    /// sRGB of a pixel, 0 to 1, over the background.
+    /// Colour of a pixel over the background, sRGB, 0 to 1.
     pub fn over_background(&self, pixel: usize) -> [f64; 3] {
         self.pixels[pixel].unwrap_or(self.around[pixel])
     }
 
-    /// All pixels over the background.
+    /// Colours of all pixels over the background, sRGB, 0 to 1.
     pub fn flat(&self) -> Vec<[f64; 3]> {
         (0..self.pixels.len()).map(|pixel| self.over_background(pixel)).collect()
     }
 
-    /// The picture whose pixels are means of `factor`² of this one's each, in linear light; covered is what is covered in part.
+    /// The picture with each block of `factor`² pixels averaged in linear light. A block is covered if any of its
+    /// pixels is.
     #[must_use]
     pub fn averaged(&self, factor: usize) -> Self {
         let [width, height] = [self.width / factor, self.pixels.len() / self.width / factor];
@@ -79,7 +80,7 @@ impl Lit {
         Self { width, pixels, around }
     }
 
-    /// The picture with each covered pixel's colour changed.
+    /// The picture with the colour of each covered pixel replaced by the result of `change`.
     #[must_use]
     pub fn changed(&self, change: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> Self {
         let change = |(pixel, color): (usize, &Option<[f64; 3]>)| color.map(|color| change(pixel, color));
@@ -88,17 +89,17 @@ impl Lit {
     }
 }
 
-/// sRGB value, 0 to 1, of a linear value 0 to 1.
+/// Converts a linear value to sRGB, both 0 to 1.
 pub fn to_srgb(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Linear value, 0 to 1, of an sRGB value 0 to 1.
+/// Converts an sRGB value to linear, both 0 to 1.
 pub fn to_linear(srgb: f64) -> f64 {
     if srgb <= 0.040_45 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Peak signal-to-noise ratio in decibels, over some pixels.
+/// Peak signal-to-noise ratio over some pixels, decibels.
 pub fn psnr(lit: &Lit, truth: &Lit, pixels: impl Iterator<Item = usize>) -> f64 {
     let mut sum = 0.0;
     let mut count = 0;
@@ -110,7 +111,7 @@ pub fn psnr(lit: &Lit, truth: &Lit, pixels: impl Iterator<Item = usize>) -> f64 
     -10.0 * (sum / f64::from(count)).log10()
 }
 
-/// The pixels that either picture covers.
+/// Indices of the pixels that either picture covers.
 pub fn either<'a>(lit: &'a Lit, truth: &'a Lit) -> impl Iterator<Item = usize> + 'a {
     (0..lit.pixels.len()).filter(|&pixel| lit.pixels[pixel].is_some() || truth.pixels[pixel].is_some())
 }

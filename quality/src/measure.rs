@@ -1,4 +1,4 @@
-//! The numbers of one picture.
+//! The measures of one picture.
 
 use crate::exact::{Exact, Seen};
 use crate::flip::Flip;
@@ -7,80 +7,82 @@ use crate::picture::{Picture, Shown};
 use crate::subject::Subject;
 use crate::verdict::{Cover, Verdicts};
 
-/// Angles in degrees between the normals shown and the true ones, 0 to 180, where both pictures show a surface and something
-/// is asked about it.
+/// Errors of normals: angles between drawn and true normals, 0° to 180°, over all measured pixels that both pictures
+/// cover.
 #[derive(Clone, Copy, Debug)]
 pub struct Angles {
-    /// Mean.
+    /// Mean angle, degrees.
     pub mean: f64,
-    /// Median.
+    /// Median angle, degrees.
     pub median: f64,
-    /// Root of the mean square.
+    /// Root mean square of the angles, degrees.
     pub rms: f64,
-    /// Share below 5°.
+    /// Share of angles below 5°.
     pub below_5: f64,
-    /// Share below 10°.
+    /// Share of angles below 10°.
     pub below_10: f64,
-    /// Share above 90°.
+    /// Share of angles above 90°.
     pub above_90: f64,
-    /// Share above 90° to all that is truly seen at the pixel and the eight around it: lit from the wrong side. At an edge either
-    /// side may be seen.
+    /// Share of pixels lit from the wrong side: the angles to all true normals at the pixel and the eight around it are
+    /// above 90°. The eight count because at an edge either side may be drawn.
     pub flipped: f64,
-    /// Mean near silhouettes.
+    /// Mean angle within 4 pixels of a silhouette, degrees.
     pub band: f64,
 }
 
-/// How much of what a spinning lidar sees is there, where it should be and nowhere else. What it does not see, in shadow or
-/// out of its beams' reach, may be there or not.
+/// How well a picture covers the surface that a spinning lidar sees: between its lowest and highest beam, with nothing
+/// in the way, at an angle of incidence of at most 87°. The rest may be covered or not.
 #[derive(Clone, Copy, Debug)]
 pub struct Swept {
-    /// Share of the true surface that the sensor sees.
+    /// Share of the true surface that the lidar sees.
     pub seen: f64,
-    /// Of that, what is covered.
+    /// Share of the seen surface that is covered, at any depth. 1 is out of reach: no point says where a surface ends past
+    /// its last ring.
     pub closed: f64,
-    /// Of that, what is covered by a surface not farther from the true one than rings are apart.
+    /// Share of the seen surface that is covered at the true depth, within a tolerance of the spacing of rings.
     pub right: f64,
-    /// Pixels covered where nothing is, or well before what the sensor does not see, over those that it sees.
+    /// Number of pixels covered outside the surface or well in front of unseen parts, over that of seen pixels.
+    /// Gaps between rings should be closed, but not what is truly open.
     pub over: f64,
 }
 
-/// The numbers of one picture.
+/// The measures of one picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Measures {
-    /// How much is where it should be.
+    /// Cover of the sampled surface.
     pub cover: Cover,
-    /// The same between the rings of a sweep; nothing for points that are not swept.
+    /// Cover between the rings of a lidar. `None` for sampled points.
     pub swept: Option<Swept>,
-    /// Errors of normals; nothing for a method that knows none.
+    /// Errors of normals. `None` for methods without normals.
     pub angles: Option<Angles>,
-    /// Mean error in depth, in pixels at that depth, over the same.
+    /// Mean error in depth over measured pixels that both pictures cover, in pixels at the true depth.
     pub depth_px: f64,
-    /// Of the lit picture with the lit truth, decibels, over the pixels that either covers and about which something is
-    /// asked.
+    /// Peak signal-to-noise ratio of the lit picture with the lit truth, decibels, over measured pixels that either
+    /// covers.
     pub psnr: f64,
-    /// Mean FLIP error of the same over the same.
+    /// Mean FLIP error of the lit picture, 0 to 1, over the same pixels as [`psnr`](Self::psnr).
     pub flip: f64,
 }
 
-/// The truth of a case, ready to be compared with.
+/// The true picture of a case, prepared for comparisons.
 #[derive(Debug)]
 pub struct Truth {
-    /// What is there.
+    /// The true surface.
     pub exact: Exact,
-    /// That, lit.
+    /// The lit true picture.
     pub lit: Lit,
     band: Vec<bool>,
     flip: Flip,
 }
 
 impl Truth {
-    /// Lights what is there.
+    /// Lights the true surface.
     pub fn new(exact: Exact) -> Self {
         let lit = Lit::new(&Picture::truth(&exact), &exact.rays);
         Self { band: exact.band(), flip: Flip::new(&lit.flat(), lit.width), lit, exact }
     }
 
-    /// Measures `picture`, and `lit`, what it looks like.
+    /// Measures `picture`. `lit` is the same picture, lit.
     pub fn measure(&self, picture: &Picture, lit: &Lit, subject: &Subject) -> Measures {
         Measures {
             cover: Verdicts::new(&self.exact, picture, subject).cover(),
@@ -92,17 +94,17 @@ impl Truth {
         }
     }
 
-    /// PSNR of `lit` with another lit truth of the same view, over the same pixels as [`Measures::psnr`].
+    /// PSNR in decibels of `lit` with another lit truth of the view, over the same pixels as [`Measures::psnr`].
     pub fn psnr_against(&self, lit: &Lit, truth: &Lit) -> f64 {
         psnr(lit, truth, self.compared(lit))
     }
 
-    /// The pixels that either picture covers, but for those that nothing is asked about.
+    /// The measured pixels that the picture or the truth covers.
     fn compared<'a>(&'a self, lit: &'a Lit) -> impl Iterator<Item = usize> + 'a {
         either(lit, &self.lit).filter(|&pixel| self.exact.is_asked(pixel))
     }
 
-    /// Mean FLIP error over those.
+    /// Mean FLIP error over the compared pixels.
     fn flip(&self, lit: &Lit) -> f64 {
         let errors = self.flip.errors(&lit.flat());
         let mut mean = Mean::default();
@@ -111,18 +113,18 @@ impl Truth {
     }
 }
 
-/// Degrees between the normal shown at a pixel and the true one, if there are both.
+/// Angle between the drawn and the true normal of a pixel, degrees. `None` if one is missing.
 pub fn angle(exact: &Exact, picture: &Picture, pixel: usize) -> Option<f64> {
     between(&exact.seen[pixel]?, &picture.shown[pixel]?)
 }
 
 fn between(seen: &Seen, shown: &Shown) -> Option<f64> {
-    // The angle's sine is exact where its cosine is not.
+    // The sine is precise at small angles, unlike the cosine.
     let sine = shown.normal.cross(seen.normal).length();
     (shown.normal.length_squared() > 0.0).then(|| sine.atan2(shown.normal.dot(seen.normal)).to_degrees())
 }
 
-/// Whether the normal shown at a pixel is turned away from all true ones there and around.
+/// Whether the drawn normal is more than 90° off all true normals at the pixel and the eight around it.
 fn is_flipped(exact: &Exact, picture: &Picture, pixel: usize) -> bool {
     let turned_away = |seen: &Seen| picture.shown[pixel].is_some_and(|shown| between(seen, &shown) > Some(90.0));
     exact.around(pixel, 1).flatten().all(turned_away)
@@ -164,7 +166,7 @@ fn swept(exact: &Exact, picture: &Picture) -> Option<Swept> {
     let closed = here().filter(|(_, shown)| shown.is_some()).count() as f64;
     let is_right = |seen: &Seen, shown: &Shown| (shown.depth - seen.depth).abs() <= seen.tolerance;
     let right = here().filter(|(seen, shown)| shown.is_some_and(|shown| is_right(seen, &shown))).count() as f64;
-    // What is not seen lies in shadow; nothing hangs before it, between what casts the shadow and what it falls on.
+    // Unseen surfaces lie in shadow. Nothing should float in front of them, on the way to what casts the shadow.
     let is_over = |seen: &Option<Seen>, shown: &Shown| match seen {
         None => true,
         Some(seen) => seen.swept == Some(false) && shown.depth < seen.depth - seen.tolerance,
@@ -189,7 +191,7 @@ fn depth_px(exact: &Exact, picture: &Picture) -> f64 {
     mean.value()
 }
 
-/// A mean in the making; no number if there is nothing.
+/// A running mean. Without values it is NaN.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mean {
     sum: f64,
@@ -197,13 +199,13 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// Takes another value.
+    /// Adds a value.
     pub fn add(&mut self, value: f64) {
         self.sum += value;
         self.count += 1.0;
     }
 
-    /// The mean.
+    /// The mean of all added values.
     pub fn value(&self) -> f64 {
         self.sum / self.count
     }
@@ -215,9 +217,9 @@ mod tests {
     use autosplats::{Camera, Projection};
 
     use super::*;
-    use crate::view::Rays;
+    use crate::rays::Rays;
 
-    /// A row of pixels with these normals.
+    /// A true picture of one row of pixels with these normals.
     fn row(normals: [DVec3; 5]) -> Exact {
         let seen = |normal| Seen { depth: 1.0, normal, spacing_px: 1.0, swept: None, sampled: true, tolerance: 0.1 };
         let camera = Camera {
@@ -256,7 +258,7 @@ mod tests {
             let angles = angles(&exact, &[false; 5], &Picture { width: 5, shown: shown.to_vec() }).expect("normals");
             [angles.above_90, angles.flipped].map(|share| (5.0 * share).round() as usize)
         };
-        assert_eq!(shares(2), [1, 0], "beside the edge it is what is seen beyond");
-        assert_eq!(shares(0), [1, 1], "further away it is wrong");
+        assert_eq!(shares(2), [1, 0], "beside the edge, the normal is the one beyond the edge");
+        assert_eq!(shares(0), [1, 1], "further from the edge, the normal is wrong");
     }
 }

@@ -1,4 +1,4 @@
-//! Triangle meshes as exact surfaces: read, made smooth, and hit by rays.
+//! Triangle meshes as exact surfaces: reading, subdivision and ray intersection.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -12,9 +12,16 @@ use bvh::bvh::Bvh;
 use bvh::ray::Ray;
 use nalgebra::{Point3, Vector3};
 
-use crate::surface::Hit;
+/// The intersection of a ray with a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance from the ray's origin.
+    pub distance: f64,
+    /// Unit normal, of either sign.
+    pub normal: DVec3,
+}
 
-/// A closed or open surface of triangles, smooth: normals are interpolated between corners.
+/// A closed or open surface of triangles. Normals are interpolated between corners.
 #[derive(Debug)]
 pub struct Mesh {
     vertices: Vec<DVec3>,
@@ -25,7 +32,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Reads the mesh in `path` and makes it smooth: each of `levels` Loop subdivisions cuts a triangle into four.
+    /// Reads the mesh in `path` and smooths it by `levels` Loop subdivisions. Each cuts a triangle into four.
     ///
     /// # Errors
     /// The file cannot be read or has no triangles.
@@ -41,7 +48,7 @@ impl Mesh {
         Ok(Self::new(vertices, triangles))
     }
 
-    /// A sphere about the origin with bumps of two sizes, of 20·4^`levels` triangles.
+    /// A sphere about the origin with bumps of two sizes. It has 20·4^`levels` triangles.
     pub fn bumpy_sphere(levels: usize) -> Self {
         let (mut vertices, mut triangles) = icosahedron();
         for _ in 0..levels {
@@ -60,7 +67,7 @@ impl Mesh {
         let mut normals = vec![DVec3::ZERO; vertices.len()];
         for triangle in &triangles {
             let [a, b, c] = triangle.map(|corner| vertices[corner as usize]);
-            // As long as the triangle is large: large ones count for more.
+            // The length is twice the triangle's area, so that large triangles have more weight.
             let normal = (b - a).cross(c - a);
             triangle.iter().for_each(|&corner| normals[corner as usize] += normal);
         }
@@ -75,20 +82,20 @@ impl Mesh {
         Self { vertices, triangles, normals, tree, boxes }
     }
 
-    /// The mesh as points with triangles, to be resampled.
+    /// Corners and triangles, for sampling.
     pub fn contents(&self) -> Contents {
         let positions = self.vertices.iter().map(|vertex| vertex.as_vec3().to_array()).collect();
         Contents { cloud: PointCloud::new(DVec3::ZERO, positions), triangles: self.triangles.clone() }
     }
 
-    /// First place where a ray meets the surface, on either side of it.
+    /// The first intersection of a ray with the surface, from either side.
     pub fn trace(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let ray = Ray::new(point(origin), Vector3::new(direction.x, direction.y, direction.z));
         let mut nearest: Option<(f64, usize, [f64; 2])> = None;
         for &TriangleBox { triangle: index, .. } in self.tree.traverse_iterator(&ray, &self.boxes) {
             let corners = self.triangles[index].map(|corner| self.vertices[corner as usize]);
             let Some((distance, weights)) = intersect(corners, origin, direction) else { continue };
-            // An edge belongs to two triangles: the first of equals, whatever the order of the walk.
+            // Two triangles share an edge. Of equal distances the lower index wins, in any order of traversal.
             if nearest.is_none_or(|(least, first, _)| (distance, index) < (least, first)) {
                 nearest = Some((distance, index, weights));
             }
@@ -100,12 +107,12 @@ impl Mesh {
     }
 }
 
-/// What the tree knows of a triangle.
+/// A triangle in the tree of boxes.
 #[derive(Debug)]
 struct TriangleBox {
     bounds: Aabb<f64, 3>,
     triangle: usize,
-    /// Where the tree has it.
+    /// Index of the tree's node.
     node: usize,
 }
 
@@ -129,7 +136,8 @@ fn point(at: DVec3) -> Point3<f64> {
     Point3::new(at.x, at.y, at.z)
 }
 
-/// Distance along the ray and weights of the second and third corner where it meets a triangle, from either side.
+/// Intersection of a ray with a triangle, from either side: the distance, and the weights of the second and third
+/// corner.
 fn intersect([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<(f64, [f64; 2])> {
     let (ab, ac, to_origin) = (b - a, c - a, origin - a);
     let across = direction.cross(ac);
@@ -141,24 +149,24 @@ fn intersect([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<(
     let beside = to_origin.cross(ab);
     let third = direction.dot(beside) / determinant;
     let distance = ac.dot(beside) / determinant;
-    // Written so that values that are no numbers miss; the slack closes the seams between triangles.
+    // NaN misses. The slack closes seams between triangles.
     let slack = 1e-9;
     let is_hit = second >= -slack && third >= -slack && second + third <= 1.0 + slack && distance > 0.0;
     is_hit.then_some((distance, [second, third]))
 }
 
-/// What is known of an edge while its triangles are gone through.
+/// An edge, with sums over its triangles.
 struct Edge {
     ends: [u32; 2],
-    /// Triangles that have it.
+    /// Number of triangles at the edge.
     count: u32,
-    /// Sum of the corners across.
+    /// Sum of the corners opposite to the edge.
     across: DVec3,
 }
 
-/// One step of Loop's subdivision. Edges of one triangle, or of more than two, stay sharp.
+/// One step of Loop subdivision. Edges of one triangle, or of more than two, stay sharp.
 fn subdivide(vertices: &[DVec3], triangles: &[[u32; 3]]) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    // In the order they are met, so that sums do not depend on the map's order.
+    // Edges keep the order of the triangles, so that sums do not depend on the map's order.
     let mut edges: Vec<Edge> = Vec::new();
     let mut found: HashMap<[u32; 2], u32> = HashMap::new();
     let mut sides = Vec::with_capacity(triangles.len());
@@ -247,12 +255,12 @@ mod tests {
             if inside < 0.01 {
                 continue;
             }
-            let hit = hit.expect("the sphere is there");
+            let hit = hit.expect("a ray through the sphere hits");
             let exact = DVec3::new(x, y, -inside.sqrt());
             assert!((hit.distance - (3.0 + exact.z)).abs() < 0.003, "{} at {exact}", hit.distance);
             assert!(hit.normal.dot(exact) > 0.9999, "{} at {exact}", hit.normal);
         }
-        assert_eq!(mesh.trace(DVec3::new(2.0, 0.0, -3.0), DVec3::Z), None, "beside it there is nothing");
+        assert_eq!(mesh.trace(DVec3::new(2.0, 0.0, -3.0), DVec3::Z), None, "a ray beside the sphere misses");
     }
 
     #[test]
@@ -261,8 +269,11 @@ mod tests {
         let cell = |i: u32| [[i, i + 1, i + 4], [i, i + 4, i + 3]];
         let triangles: Vec<_> = [0, 1, 3, 4].into_iter().flat_map(cell).collect();
         let (vertices, finer) = subdivide(&grid, &triangles);
-        assert_eq!(finer.len(), 4 * triangles.len(), "four for each");
-        assert!(vertices.iter().all(|v| v.z == 0.0 && v.min_element() >= 0.0 && v.max_element() <= 2.0), "stays in it");
-        assert!(vertices.contains(&DVec3::new(0.5, 0.0, 0.0)), "a border is cut in the middle");
+        assert_eq!(finer.len(), 4 * triangles.len(), "four triangles for each");
+        assert!(
+            vertices.iter().all(|v| v.z == 0.0 && v.min_element() >= 0.0 && v.max_element() <= 2.0),
+            "the plane stays plane"
+        );
+        assert!(vertices.contains(&DVec3::new(0.5, 0.0, 0.0)), "a border edge is cut in its middle");
     }
 }

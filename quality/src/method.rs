@@ -1,4 +1,4 @@
-//! The ways to draw points that are compared.
+//! The compared methods of drawing points.
 
 use std::collections::HashMap;
 use std::num::NonZero;
@@ -15,33 +15,33 @@ use rayon::prelude::*;
 use crate::light::{BACKGROUND, Lit};
 use crate::neighbors::Neighbors;
 use crate::picture::{Picture, Shown};
+use crate::rays::Rays;
 use crate::subject::Subject;
-use crate::view::Rays;
 
-/// Numbers of neighbours that plane fits have.
+/// Numbers of neighbours of the plane fits.
 pub const FIT_KS: [usize; 4] = [10, 40, 160, 640];
-/// Side of a dot in pixels.
+/// Side of a dot, pixels.
 const DOT_PX: isize = 3;
 
-/// A way to draw points.
+/// A method of drawing points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// This project's default.
+    /// This project's default settings.
     Ours,
-    /// The paper's settings.
+    /// The paper's settings, [`paper`].
     Paper,
-    /// Squares of a fixed size in pixels, the nearest in front.
+    /// Squares of 3x3 pixels without normals, the nearest in front.
     Dots,
-    /// The paper's splats, but trimmed, with normals of plane fits to the exact nearest neighbours in the whole cloud, so many of
-    /// them.
+    /// The paper's splats, but trimmed, with normals of plane fits to this number of exact nearest neighbours in the
+    /// whole cloud. Outliers are neighbours too, but are not drawn.
     Fit(usize),
-    /// Our splats as discs, of points that lie on the surface, without noise, misregistration and outliers, with its normals there;
-    /// without those that lie just beyond its borders.
+    /// Our splats as discs, of points without noise, misregistration and outliers, with the surface's own normals.
+    /// Points just beyond borders are left out. The pictures have no errors of normals and places.
     Known,
 }
 
 impl Method {
-    /// All of them.
+    /// All methods.
     pub const ALL: [Self; 8] = [
         Self::Ours,
         Self::Paper,
@@ -53,7 +53,7 @@ impl Method {
         Self::Known,
     ];
 
-    /// A short name.
+    /// The name in tables and records.
     pub fn name(self) -> String {
         match self {
             Self::Ours => "ours".into(),
@@ -65,7 +65,7 @@ impl Method {
     }
 }
 
-/// The paper's settings, field by field: whatever the library's defaults become.
+/// The paper's settings. Every field is written out, so that new defaults change nothing.
 pub fn paper() -> Reconstruction {
     Reconstruction {
         k: 10,
@@ -85,14 +85,14 @@ pub fn paper() -> Reconstruction {
     }
 }
 
-/// Settings to look at shapes with.
+/// Settings that show the shape alone: one colour on a plain background, with all layers.
 pub fn plain(reconstruction: Reconstruction) -> Settings {
     let background = Background::Color(BACKGROUND);
     let shading = Shading { color: ColorMode::Plain, background, ..Shading::default() };
     Settings { reconstruction, shading, all_layers: true }
 }
 
-/// Draws one subject, and keeps what helps to draw it again.
+/// Draws one subject. Keeps the renderer and the plane fits for further pictures.
 #[derive(Debug)]
 pub struct Painter<'a> {
     subject: &'a Subject,
@@ -106,10 +106,10 @@ impl<'a> Painter<'a> {
         Self { subject, renderer: Renderer::new(), fits: Fits::default() }
     }
 
-    /// A picture of `size` pixels.
+    /// Draws a picture of `size` pixels.
     ///
     /// # Errors
-    /// What the renderer refuses.
+    /// An invalid camera, or an error of the renderer.
     pub fn paint(&mut self, method: Method, camera: &Camera, size: [u32; 2]) -> Result<Picture> {
         let subject = self.subject;
         match method {
@@ -117,10 +117,10 @@ impl<'a> Painter<'a> {
             Method::Paper => self.render(paper(), camera, size),
             Method::Dots => Ok(dots(subject, &Rays::new(camera, size)?, size)),
             Method::Fit(k) => {
-                // They are compared by their normals: what whole splats draw past silhouettes would be no fault of these.
+                // Fits are compared by their normals. Untrimmed splats would add errors at silhouettes.
                 let trimmed = Reconstruction { trim: true, ..paper() };
                 let mut surfels = self.surfels(&subject.cloud, &trimmed, camera, size)?;
-                // Who has the whole cloud knows its outliers, and draws none.
+                // This reference knows the outliers and draws none.
                 surfels.retain(|surfel| !subject.is_outlier(surfel.point));
                 let normals = self.fits.normals(&subject.cloud, &surfels, k);
                 self.draw(&subject.cloud, trimmed, surfels.iter().zip(normals), camera, size)
@@ -135,7 +135,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// All points of `cloud` that may be seen, with their radii.
+    /// Surfels of all points of `cloud` that may be visible, with their radii.
     fn surfels(
         &mut self,
         cloud: &PointCloud,
@@ -143,7 +143,7 @@ impl<'a> Painter<'a> {
         camera: &Camera,
         size: [u32; 2],
     ) -> Result<Vec<PointSurfel>> {
-        // Without culling every visible point has a surfel.
+        // Culling would leave visible points without surfels.
         let all = plain(Reconstruction { grid_culling: false, ..reconstruction.clone() });
         self.renderer.render(cloud, camera, size, &all)?;
         let mut surfels = self.renderer.surfels()?;
@@ -151,7 +151,7 @@ impl<'a> Painter<'a> {
         Ok(surfels)
     }
 
-    /// A picture of these points of `cloud` alone, as discs with these normals.
+    /// Draws these surfels of `cloud` alone, as discs with these normals.
     fn draw<'s>(
         &mut self,
         cloud: &PointCloud,
@@ -173,18 +173,18 @@ impl<'a> Painter<'a> {
         Ok(Picture::new(frame.layers, &Rays::new(camera, size)?))
     }
 
-    /// A picture with the renderer's own way to find normals.
+    /// Draws a picture with the renderer's own normals.
     ///
     /// # Errors
-    /// What the renderer refuses.
+    /// An invalid camera, or an error of the renderer.
     pub fn render(&mut self, reconstruction: Reconstruction, camera: &Camera, size: [u32; 2]) -> Result<Picture> {
         Ok(self.render_lit(reconstruction, camera, size)?.0)
     }
 
-    /// The same, and how the renderer itself lights it: what follows other pictures shows something of these.
+    /// Draws a picture and returns the renderer's own light too, in which pictures of a sequence are averaged.
     ///
     /// # Errors
-    /// What the renderer refuses.
+    /// An invalid camera, or an error of the renderer.
     pub fn render_lit(
         &mut self,
         reconstruction: Reconstruction,
@@ -198,16 +198,17 @@ impl<'a> Painter<'a> {
     }
 }
 
-/// Plane fits of the points that were needed so far.
+/// Plane fits of all points drawn so far.
 #[derive(Debug, Default)]
 struct Fits {
     neighbors: Option<Neighbors>,
-    /// Normals for each of [`FIT_KS`].
+    /// Normals of each point, for each of [`FIT_KS`].
     found: HashMap<u32, [Vec3; FIT_KS.len()]>,
 }
 
 impl Fits {
-    /// Normals of the planes through the points of `surfels` and their k nearest neighbours in a cloud, the same each time.
+    /// Normals of planes fitted to the k nearest neighbours of the surfels' points. `cloud` must be the same in all
+    /// calls.
     fn normals(&mut self, cloud: &PointCloud, surfels: &[PointSurfel], k: usize) -> Vec<Vec3> {
         let first = NonZero::new(FIT_KS[0]).expect("above 0");
         let neighbors = self.neighbors.get_or_insert_with(|| Neighbors::new(cloud, first));
@@ -224,10 +225,10 @@ impl Fits {
     }
 }
 
-/// Each point as a square of [`DOT_PX`] pixels.
+/// Draws each point as a square with sides of [`DOT_PX`] pixels.
 fn dots(subject: &Subject, rays: &Rays, [width, height]: [u32; 2]) -> Picture {
     let [width, height] = [width, height].map(|side| side as isize);
-    // Depths above 0 have the order of their bits.
+    // The bits of positive floats are ordered like the floats.
     let pixels: Vec<AtomicU64> = (0..width * height).map(|_| AtomicU64::new(u64::MAX)).collect();
     let cloud = &subject.cloud;
     (0..cloud.len()).into_par_iter().for_each(|point| {

@@ -1,33 +1,32 @@
-//! What a picture shows at each pixel.
+//! Pictures as depths, normals and points of pixels.
 
 use autosplats::GBuffer;
 use autosplats::cloud::glam::DVec3;
 
-use crate::exact::Exact;
-use crate::view::Rays;
+use crate::rays::Rays;
 
-/// What a picture shows at a pixel.
+/// The surface that a picture shows at a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shown {
-    /// Along the viewing axis.
+    /// Depth along the viewing axis.
     pub depth: f64,
-    /// World space, towards the eye; zero where the method knows none.
+    /// Unit normal in world space, towards the eye. Zero for methods without normals.
     pub normal: DVec3,
-    /// Index of the point whose splat is the heaviest; nothing sensible in a picture of the truth.
+    /// Index of the point whose splat has the greatest weight. Meaningless in a true picture.
     pub point: u32,
 }
 
-/// A picture, row by row.
+/// A picture, in rows of pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Pixels in a row.
+    /// Number of pixels in a row.
     pub width: usize,
-    /// What each pixel shows.
+    /// The surface at each pixel. `None` where the picture is empty.
     pub shown: Vec<Option<Shown>>,
 }
 
 impl Picture {
-    /// The picture that a renderer's layers are.
+    /// The picture in the layers of a renderer.
     pub fn new(layers: &GBuffer, rays: &Rays) -> Self {
         let [width, height] = [layers.width, layers.height].map(|side| side as usize);
         let show = |pixel: usize| {
@@ -39,20 +38,12 @@ impl Picture {
         Self { width, shown: (0..width * height).map(show).collect() }
     }
 
-    /// The picture that nobody can improve on.
-    pub fn truth(exact: &Exact) -> Self {
-        let show = |seen: &Option<crate::exact::Seen>| {
-            seen.map(|seen| Shown { depth: seen.depth, normal: seen.normal, point: u32::MAX })
-        };
-        Self { width: exact.width, shown: exact.seen.iter().map(show).collect() }
-    }
-
-    /// Pixels in a column.
+    /// Number of pixels in a column.
     pub fn height(&self) -> usize {
         self.shown.len() / self.width
     }
 
-    /// The picture moved right by `px` pixels, its right edge coming in on the left.
+    /// The picture moved right by `px` pixels. Its right edge continues on the left.
     #[must_use]
     pub fn shifted(&self, px: usize) -> Self {
         let mut shown = self.shown.clone();
@@ -60,7 +51,7 @@ impl Picture {
         Self { width: self.width, shown }
     }
 
-    /// The picture with the normals of `other` wherever both show something.
+    /// The picture with the normals of `other` where both show a surface.
     #[must_use]
     pub fn with_normals_of(&self, other: &Self) -> Self {
         let replace = |(shown, other): (&Option<Shown>, &Option<Shown>)| {
@@ -69,7 +60,7 @@ impl Picture {
         Self { width: self.width, shown: self.shown.iter().zip(&other.shown).map(replace).collect() }
     }
 
-    /// The picture with each pixel that shows something changed, or emptied, by what `change` makes of it.
+    /// The picture with every covered pixel replaced by the result of `change`, which may be empty.
     #[must_use]
     pub fn changed(&self, change: impl Fn(usize, Shown) -> Option<Shown>) -> Self {
         let change = |(pixel, shown): (usize, &Option<Shown>)| shown.and_then(|shown| change(pixel, shown));

@@ -14,47 +14,48 @@ use crate::still::{self, Still};
 use crate::subject::Subject;
 use crate::view::orbit;
 
-/// A case with what was measured.
+/// The measures of a case.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// The case.
+    /// The measured case.
     pub case: Case,
-    /// For each of [`Method::ALL`].
+    /// Measures of each method's picture.
     pub measures: Vec<(Method, Measures)>,
-    /// Lit pictures against a truth of many rays.
+    /// Lit pictures against the truth of 16 rays per pixel.
     pub still: Still,
-    /// What changed while the camera moved, if it did.
+    /// Changes while the camera moves, of cases with motion.
     pub motion: Option<Motion>,
 }
 
-/// What changed while the camera moved.
+/// Changes of the pictures while the camera moves.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// In the true pictures: what light and pixels do.
+    /// Change of the true pictures. The light moves with the camera, and details finer than pixels flicker.
     pub truth: Change,
-    /// The lightness in true pictures of many rays a pixel, in which no detail flickers.
+    /// Change of lightness in true pictures of 16 rays per pixel, in 255ths. Their details do not flicker.
     pub smooth: f64,
-    /// In those of each method; ours are steady, as the window has them while the view moves.
+    /// Change of each method's pictures. Ours use earlier pictures, as in the window while the view moves. See
+    /// docs/decisions/0014-frame-to-frame.md.
     pub methods: Vec<(Method, Change)>,
-    /// In ours, each made by itself.
+    /// Change of our pictures if each is rendered by itself.
     pub alone: Change,
-    /// Mean error of normals in ours of the last step, degrees: by itself, and steady.
+    /// Mean error of normals in our picture of the last step, degrees: rendered by itself, and from earlier pictures.
     pub degrees_off: [f64; 2],
 }
 
 /// The pictures of a case.
 #[derive(Debug)]
 pub struct Pictures {
-    /// What is truly there.
+    /// The true picture.
     pub truth: Truth,
-    /// What each method drew, and that lit.
+    /// Each method's picture, also lit.
     pub drawn: Vec<(Method, Picture, Lit)>,
 }
 
 /// Draws a case with each of `methods` and measures the pictures.
 ///
 /// # Errors
-/// What the renderer refuses.
+/// An invalid camera, or an error of the renderer.
 pub fn measure(
     case: &Case,
     subject: &Subject,
@@ -77,20 +78,20 @@ pub fn measure(
     Ok((Outcome { case: *case, measures, still, motion }, Pictures { truth, drawn }))
 }
 
-/// Moves the camera of a case around its subject and follows what changes.
+/// Measures changes while the camera of a case moves around its subject.
 fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: &[Method]) -> Result<Motion> {
     let camera = case.shot.camera(subject, case.size)?;
     let methods: Vec<_> = methods.iter().copied().filter(|method| !matches!(method, Method::Fit(_))).collect();
-    // What is steady follows pictures of its own kind.
+    // A renderer of its own: what it keeps of earlier pictures must be of the same settings.
     let mut follower = Painter::new(subject);
     let steady = Reconstruction { steady: true, ..Reconstruction::default() };
     let mut changes = vec![Changes::default(); 3 + methods.len()];
     for step in (1..=LEAD_IN).rev() {
-        follower.render(steady.clone(), &orbit(&camera, step as f64 * -STEP_DEGREES)?, case.size)?;
+        follower.render(steady.clone(), &orbit(&camera, step as f64 * -STEP_DEGREES), case.size)?;
     }
     let mut before: Option<(Exact, Vec<(Picture, Lit)>)> = None;
     for step in 0..=STEPS {
-        let camera = orbit(&camera, step as f64 * STEP_DEGREES)?;
+        let camera = orbit(&camera, step as f64 * STEP_DEGREES);
         let exact = Exact::trace_alone(subject, &camera, case.size)?;
         let true_picture = Picture::truth(&exact);
         let lit = |picture: Picture| {
@@ -113,7 +114,7 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
         }
         before = Some((exact, pictures));
     }
-    let last = Truth::new(Exact::trace(subject, &orbit(&camera, STEPS as f64 * STEP_DEGREES)?, case.size)?);
+    let last = Truth::new(Exact::trace(subject, &orbit(&camera, STEPS as f64 * STEP_DEGREES), case.size)?);
     let degrees_off = |picture: Option<&(Picture, Lit)>| {
         let angles = picture.and_then(|(picture, lit)| last.measure(picture, lit, subject).angles);
         angles.map_or(f64::NAN, |angles| angles.mean)
@@ -122,7 +123,7 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
     let degrees_off = before.map_or([f64::NAN; 2], |(_, shown)| [2, ours].map(|at| degrees_off(shown.get(at))));
     let mut means = changes.iter().map(Changes::mean);
     let (Some(truth), Some(smooth), Some(alone)) = (means.next(), means.next(), means.next()) else {
-        unreachable!("there are three and more")
+        unreachable!("there are at least three changes")
     };
     Ok(Motion {
         truth,
@@ -134,17 +135,67 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
 }
 
 impl Outcome {
-    /// What a method measured, if it was asked to.
+    /// The measures of a method's picture, if the method was measured.
     pub fn of(&self, method: Method) -> Option<&Measures> {
         self.measures.iter().find(|(other, _)| *other == method).map(|(_, measures)| measures)
     }
 
-    /// The least of a value over the plane fits, and the number of neighbours that has it.
+    /// The lowest value of the plane fits, after the number of neighbours that has it.
     pub fn best_fit(&self, value: impl Fn(&Angles) -> f64) -> Option<(usize, f64)> {
         let fits = self.measures.iter().filter_map(|(method, measures)| match method {
             Method::Fit(k) => Some((*k, value(measures.angles.as_ref()?))),
             _ => None,
         });
         fits.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// An error of a method's normals over the lowest of the plane fits.
+    pub fn over_best_fit(&self, method: Method, value: fn(&Angles) -> f64) -> Option<f64> {
+        Some(value(self.of(method)?.angles.as_ref()?) / self.best_fit(value)?.1)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::case::quick;
+    use crate::verdict::Cover;
+
+    /// An outcome in which ours has this error of normals in degrees and this PSNR, and the best plane fits this error.
+    /// The paper's picture and dots are worse.
+    pub(crate) fn outcome(ours: f64, fit: f64, psnr: f64) -> Outcome {
+        let cover =
+            Cover { spacing_px: 1.0, sampled: 1.0, iou: 0.999, wider_px: 0.0, holes: 0.0, leaks: 0.0, before: 0.0 };
+        let measures = |mean: f64, psnr| {
+            let angles = Angles {
+                mean,
+                median: mean,
+                rms: mean,
+                below_5: 1.0,
+                below_10: 1.0,
+                above_90: 0.0,
+                flipped: 0.0,
+                band: mean,
+            };
+            Measures { cover, swept: None, angles: Some(angles), depth_px: 0.1, psnr, flip: 0.1 }
+        };
+        let dots = Measures { angles: None, ..measures(0.0, 20.0) };
+        let methods = vec![
+            (Method::Ours, measures(ours, psnr)),
+            (Method::Paper, measures(9.0, 28.0)),
+            (Method::Dots, dots),
+            (Method::Fit(10), measures(2.0 * fit, 28.0)),
+            (Method::Fit(40), measures(fit, 28.0)),
+        ];
+        let change = |degrees| Change { degrees, lightness: 1.0 };
+        let motion = Motion {
+            truth: change(1.0),
+            smooth: 1.0,
+            methods: vec![(Method::Ours, change(ours))],
+            alone: change(ours),
+            degrees_off: [1.0; 2],
+        };
+        let still = Still { one_ray: 40.0, still: 33.0, methods: vec![(Method::Ours, psnr)] };
+        Outcome { case: quick()[0], measures: methods, still, motion: Some(motion) }
     }
 }

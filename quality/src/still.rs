@@ -1,8 +1,8 @@
-//! Pictures against a truth with many rays for each pixel, which knows what is finer than one.
+//! Pictures against a truth of 16 rays per pixel.
 //!
-//! One ray through the middle of a pixel tells normals and outlines there. A picture is to show all of the pixel: of what is finer,
-//! the mean. So lit pictures are held against this truth as well, and among them stills, as `autosplats render` and a window at
-//! rest make them: rendered twice as wide and high, and averaged.
+//! One ray through a pixel's middle gives the normal and outline there. A picture should show the mean of all details
+//! in the pixel. So lit pictures are compared with this finer truth too. Among them are stills, as `autosplats render`
+//! and a window at rest make them: rendered twice as wide and high, and averaged.
 
 use anyhow::Result;
 use autosplats::{Camera, Reconstruction};
@@ -13,38 +13,38 @@ use crate::light::Lit;
 use crate::measure::Truth;
 use crate::method::{Method, Painter};
 use crate::picture::Picture;
+use crate::rays::Rays;
 use crate::subject::Subject;
-use crate::view::Rays;
 
-/// Rays for each pixel along a side.
+/// Number of rays per pixel along each side.
 pub const RAYS: u32 = 4;
-/// How many times as wide and high stills are rendered.
+/// Factor of a still's width and height before averaging.
 pub const SUPERSAMPLE: u32 = 2;
 
-/// PSNR in decibels against the truth of many rays, over the pixels that either the picture or the truth of one ray covers.
+/// PSNR in decibels against the truth of 16 rays, over the pixels that the picture or the truth of one ray covers.
 #[derive(Clone, Debug)]
 pub struct Still {
-    /// Of the truth of one ray.
+    /// PSNR of the truth of one ray per pixel.
     pub one_ray: f64,
-    /// Of ours as a still.
+    /// PSNR of our still.
     pub still: f64,
-    /// Of each method's picture.
+    /// PSNR of each method's picture.
     pub methods: Vec<(Method, f64)>,
 }
 
-/// The truth of many rays, lit, in a picture of `size` pixels.
+/// The lit truth of 16 rays per pixel, averaged to `size` pixels.
 ///
 /// # Errors
-/// A camera that cannot see.
+/// An invalid camera.
 pub fn smooth(subject: &Subject, camera: &Camera, size: [u32; 2]) -> Result<Lit> {
     let fine = Exact::trace_alone(subject, camera, size.map(|side| side * RAYS))?;
     Ok(Lit::new(&Picture::truth(&fine), &fine.rays).averaged(RAYS as usize))
 }
 
-/// Measures what was drawn in a case, `lit` of each method, and ours as a still besides.
+/// Measures each method's lit picture of a case, and our still.
 ///
 /// # Errors
-/// What the renderer refuses.
+/// An invalid camera, or an error of the renderer.
 pub fn measure<'a>(
     case: &Case,
     subject: &Subject,

@@ -1,10 +1,10 @@
-//! What pictures are taken of: a surface, and points on it as good or as bad as scanners make them.
+//! Subjects of pictures: an exact surface, and points on it with the defects of real scans.
 //!
 //! # How it works
-//! Meshes get points strewn evenly over their area. A density other than even strews more, and drops each with a
-//! probability that depends on its place. Instead of being strewn, points can be what a spinning lidar sees of the
-//! surface. Then come, in this order: the misregistration of every other point, noise, and outliers behind all others. The
-//! points without the last three say where the surface counts as sampled; of a lidar its steps do.
+//! Points are sampled evenly over the surface, or where the rays of a spinning lidar hit it. Uneven densities sample
+//! more points and drop each with a probability that depends on its place. Then every other point is misregistered, all
+//! get noise, and outliers are appended, in this order. Points without these three defects say where the surface counts
+//! as sampled. For a lidar its steps say so.
 
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
@@ -14,117 +14,118 @@ use anyhow::{Context as _, Result};
 use autosplats::cloud::glam::{DQuat, DVec3};
 use autosplats::cloud::{Axes, PointCloud, Scene, sample_surface};
 
-use crate::mesh::Mesh;
+use crate::mesh::{Hit, Mesh};
 use crate::neighbors::Neighbors;
 use crate::random::Random;
-use crate::surface::{Hit, Surface};
+use crate::rays::Rays;
+use crate::surface::Surface;
 use crate::sweep::Sweep;
-use crate::view::Rays;
 
-/// Neighbours that say how densely a surface is sampled.
+/// Number of neighbours from which the spacing of points is computed.
 const SPACING_K: NonZero<usize> = NonZero::new(10).expect("above 0");
-/// Standard deviations within which nearly all noise is.
+/// Greatest noise expected, in standard deviations.
 const NEARLY_ALL: f64 = 4.0;
-/// Axis of the turn and direction of the shift of a scan that is badly registered.
+/// Axis about which a misregistered scan is turned. It need not have length 1.
 const TURN_AXIS: DVec3 = DVec3::new(0.48, 0.6, 0.64);
+/// Direction in which a misregistered scan is shifted. It need not have length 1.
 const SHIFT: DVec3 = DVec3::new(0.64, -0.48, 0.6);
 
-/// Where the surface comes from.
+/// The origin of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// A built-in scene, by name.
+    /// A built-in scene of this name.
     Scene(&'static str),
-    /// A sphere with bumps, of 20·4^n triangles.
+    /// A sphere with bumps. It has 20·4^n triangles.
     Bumpy(usize),
-    /// A mesh in the folder of test data, and how many times it is subdivided.
+    /// A mesh in the folder of test data.
     Mesh {
-        /// What it is called.
+        /// The mesh's name.
         name: &'static str,
-        /// Where in the folder it is.
+        /// Path of the file in the folder.
         path: &'static str,
-        /// Loop subdivisions.
+        /// Number of Loop subdivisions.
         levels: usize,
     },
 }
 
-/// The Stanford bunny, of 1.1 million triangles: as many as points of the densest cloud, or fits would see facets.
+/// The Stanford bunny. Its 1.1 million triangles are as many as points of its densest cloud, which hides the facets.
 pub const BUNNY: Source = Source::Mesh { name: "bunny", path: "models/bunny.ply", levels: 2 };
-/// The galloping horse of Sumner and Popović.
+/// A galloping horse, by Sumner and Popović.
 pub const HORSE: Source = Source::Mesh { name: "horse", path: "animation/horse_gallop/frame_000.ply", levels: 2 };
-/// The samba dancer of Vlasic et al.
+/// A samba dancer, by Vlasic et al.
 pub const DANCER: Source = Source::Mesh { name: "dancer", path: "animation/samba/frame_000.ply", levels: 2 };
 
-/// How densely points lie, over place.
+/// The density of points, over the place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Density {
-    /// The same everywhere.
+    /// The same density everywhere.
     #[default]
     Even,
-    /// Dense and sparse patches, up to 12 times apart.
+    /// Dense and sparse patches, with densities of up to 12 to 1.
     Uneven,
-    /// Stripes across, six times as dense as what lies between them.
+    /// Stripes, six times as dense as the surface between them.
     Striped,
-    /// Falling from one end to the other, to a twentieth.
+    /// Falling along x, to a twentieth.
     Gradient,
 }
 
-/// How to make a subject. Lengths are shares of the diagonal of the points' box, but for those of a sweep.
+/// How to make a subject. Lengths are shares of the diagonal of the points' box, those of a lidar metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recipe {
-    /// The surface.
+    /// Origin of the surface.
     pub source: Source,
-    /// Points on the surface, nearly, or the rays of a sweep, of which many may miss it; outliers come on top.
+    /// Approximate number of points on the surface without outliers, or number of the lidar's rays.
     pub count: usize,
-    /// How densely they lie, unless swept.
+    /// Density of sampled points. A lidar has its own.
     pub density: Density,
-    /// The lidar that sees them, if they are not strewn. It has its own noise.
+    /// The lidar that scans the surface, with its own noise. `None` for sampled points.
     pub sweep: Option<Sweep>,
-    /// Standard deviation of noise, the same in each of three directions.
+    /// Standard deviation of noise, the same in all directions.
     pub noise: f64,
-    /// Outliers, as a share of the points, evenly in the box.
+    /// Number of outliers, as a share of the points. They are spread evenly over the box.
     pub outliers: f64,
-    /// Every other point belongs to a second scan, shifted by this and turned by 0.1°.
+    /// Shift of a second scan of every other point, which is also turned by 0.1°. 0 for one scan.
     pub misregistration: f64,
 }
 
 impl Recipe {
-    /// Clean, even points.
+    /// Evenly sampled points without defects.
     pub const fn new(source: Source, count: usize) -> Self {
         Self { source, count, density: Density::Even, sweep: None, noise: 0.0, outliers: 0.0, misregistration: 0.0 }
     }
 
-    /// What a spinning lidar sees.
+    /// The points of a spinning lidar.
     pub const fn swept(source: Source, sweep: Sweep) -> Self {
         Self { sweep: Some(sweep), ..Self::new(source, sweep.count()) }
     }
 
-    /// The same with another density.
+    /// The recipe with another density.
     pub const fn density(self, density: Density) -> Self {
         Self { density, ..self }
     }
 
-    /// The same with noise.
+    /// The recipe with noise.
     pub const fn noise(self, noise: f64) -> Self {
         Self { noise, ..self }
     }
 
-    /// The same with outliers.
+    /// The recipe with outliers.
     pub const fn outliers(self, outliers: f64) -> Self {
         Self { outliers, ..self }
     }
 
-    /// The same as two scans that do not quite fit.
+    /// The recipe with a second scan that is shifted by this.
     pub const fn misregistration(self, misregistration: f64) -> Self {
         Self { misregistration, ..self }
     }
 
-    /// Whether points lie elsewhere than on the surface.
+    /// Whether points lie beside the surface.
     pub fn is_noisy(&self) -> bool {
         let range_noise = self.sweep.map_or(0.0, |sweep| sweep.noise);
         self.noise > 0.0 || range_noise > 0.0 || self.outliers > 0.0 || self.misregistration > 0.0
     }
 
-    /// What the surface is called.
+    /// The surface's name.
     pub fn surface_name(&self) -> &'static str {
         match self.source {
             Source::Scene(name) | Source::Mesh { name, .. } => name,
@@ -132,7 +133,7 @@ impl Recipe {
         }
     }
 
-    /// A short name for everything.
+    /// The name: surface, number of points or rays, and defects.
     pub fn name(&self) -> String {
         let thousands = self.count / 1000;
         let count = match self.sweep {
@@ -158,7 +159,7 @@ impl Recipe {
         name
     }
 
-    /// Whether what it takes is there: meshes are not part of the repository.
+    /// Whether the mesh is present. Meshes are not part of the repository.
     pub fn is_available(&self) -> bool {
         match self.source {
             Source::Mesh { path, .. } => data_folder().join(path).is_file(),
@@ -167,36 +168,36 @@ impl Recipe {
     }
 }
 
-/// Where real scans and models are: the folder that `AUTOSPLATS_DATA` names, else one beside the repository.
+/// Folder of real scans and models: `AUTOSPLATS_DATA`, by default `shared/data` beside the repository.
 pub fn data_folder() -> PathBuf {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from)
 }
 
-/// A surface with its points.
+/// A surface with points on it.
 #[derive(Debug)]
 pub struct Subject {
-    /// What it was made from.
+    /// Recipe of the subject.
     pub recipe: Recipe,
-    /// What the points lie on.
+    /// The exact surface.
     pub surface: Surface,
-    /// What is rendered.
+    /// The points to render.
     pub cloud: PointCloud,
-    /// The points where they would be without noise, misregistration and outliers, in the same order.
+    /// The points without noise, misregistration and outliers, in the same order, for neighbour searches.
     pub clean: Neighbors,
-    /// The same, to be rendered.
+    /// The points without noise, misregistration and outliers, to render.
     pub clean_cloud: PointCloud,
-    /// How far points may lie off the surface, in its unit.
+    /// Greatest distance from the surface expected of a point that is no outlier, in world units.
     pub blur: f64,
-    /// Diagonal of the clean points' box.
+    /// Diagonal of the box of [`clean`](Self::clean), in world units.
     pub diagonal: f64,
 }
 
 impl Subject {
-    /// Makes the points. The same recipe gives the same bytes.
+    /// Makes the points. The same recipe gives the same points, bit by bit.
     ///
     /// # Errors
-    /// A mesh that cannot be read.
+    /// The mesh cannot be read.
     pub fn new(recipe: Recipe) -> Result<Self> {
         let (surface, even) = strew(&recipe)?;
         let axes = even.axes();
@@ -238,22 +239,22 @@ impl Subject {
         })
     }
 
-    /// Normal of the surface at a point that is no outlier, where it would be without noise; of either sign. Where the surface is
-    /// not found, that of a plane fit.
+    /// Normal of the surface at a point without noise and misregistration, of either sign. The point must be no
+    /// outlier. If no surface is near, the normal is that of a plane fit.
     pub fn normal(&self, point: u32) -> DVec3 {
         let place = self.clean.position(point);
         let fitted = self.clean.normal(point);
         let height = self.height(place);
-        // From above and from below, whichever meets the surface nearer to the point: other surfaces may be near.
+        // Rays from above and below. The hit nearer to the point counts, as other surfaces may be close.
         let hits = [fitted, -fitted].map(|up| self.surface.trace(place + up * height, -up));
         let off = |hit: &Hit| (hit.distance - height).abs();
         let nearest = hits.into_iter().flatten().min_by(|one, other| off(one).total_cmp(&off(other)));
         nearest.filter(|hit| off(hit) < height).map_or(fitted, |hit| hit.normal)
     }
 
-    /// Whether a surface hides such a point, and lies before it by less than its neighbours are away: the point is just beyond a
-    /// border then, and mostly faces away. What is hidden by more may be all that there is of a thing, as scanners see one side of
-    /// many.
+    /// Whether a point lies just beyond a border: the surface that hides it is nearer to it than its farthest
+    /// neighbour. Most such points face away from the eye. Points hidden at a distance may be all that is scanned of a
+    /// thing.
     pub fn is_beyond_border(&self, point: u32, rays: &Rays) -> bool {
         let place = self.clean.position(point);
         let Some((at, _)) = rays.project(place) else { return false };
@@ -263,18 +264,18 @@ impl Subject {
         self.surface.trace(origin, direction).is_some_and(|hit| (self.height(place)..reach).contains(&behind(hit)))
     }
 
-    /// A quarter of how far the nearest other point is from one: much farther than rounding puts it off the surface.
+    /// A quarter of the distance to the nearest other point: much more than rounding errors.
     fn height(&self, place: DVec3) -> f64 {
         0.25 * self.clean.around(place)[1].length()
     }
 
-    /// Whether a point is one of the outliers.
+    /// Whether a point is an outlier.
     pub fn is_outlier(&self, point: u32) -> bool {
         point as usize >= self.clean.len()
     }
 }
 
-/// The surface and clean points on it.
+/// The surface, and points on it without defects.
 fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
     let mesh = match recipe.source {
         Source::Scene(name) => {
@@ -283,7 +284,7 @@ fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
                 return Ok(swept(Surface::Scene(scene), sweep, Axes::ZUp));
             }
             let cloud = scene.sample(recipe.count, &|_| true)?;
-            // Without colours: light shows the shape.
+            // Colours are dropped, so that light alone shows the shape.
             let plain = PointCloud::new(cloud.origin(), cloud.positions().to_vec()).with_axes(Axes::ZUp);
             return Ok((Surface::Scene(scene), plain));
         }
@@ -297,7 +298,7 @@ fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
     let contents = mesh.contents();
     let (low, high) = bounds(contents.cloud.positions());
     let keep = |p: &[f32; 3]| kept(recipe.density, (DVec3::from(p.map(f64::from)) - low) / (high - low));
-    let sample = |count, seed| sample_surface(&contents, count, seed, &()).context("strewing points");
+    let sample = |count, seed| sample_surface(&contents, count, seed, &()).context("cannot sample points");
     let cloud = if recipe.density == Density::Even {
         sample(recipe.count, 1)?
     } else {
@@ -311,13 +312,13 @@ fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
     Ok((Surface::Mesh(Arc::new(mesh)), cloud.with_axes(axes)))
 }
 
-/// The surface and what a lidar sees of it.
+/// The surface, and the points that a lidar scans of it.
 fn swept(surface: Surface, sweep: Sweep, axes: Axes) -> (Surface, PointCloud) {
     let points = sweep.points(&surface).iter().map(|point| point.as_vec3().to_array()).collect();
     (surface, PointCloud::new(DVec3::ZERO, points).with_axes(axes))
 }
 
-/// Probability that a point at `at`, 0 to 1 along each side of the box, is kept.
+/// Probability of keeping a point. `at` is its place, 0 to 1 along each side of the box.
 fn kept(density: Density, at: DVec3) -> f64 {
     match density {
         Density::Even => 1.0,

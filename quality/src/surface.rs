@@ -1,32 +1,23 @@
-//! Surfaces that are known exactly.
+//! Exact surfaces.
 
 use std::sync::Arc;
 
 use autosplats::cloud::Scene;
 use autosplats::cloud::glam::DVec3;
 
-use crate::mesh::Mesh;
+use crate::mesh::{Hit, Mesh};
 
-/// Where a ray meets a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// From the ray's origin.
-    pub distance: f64,
-    /// Unit normal, on either side.
-    pub normal: DVec3,
-}
-
-/// A surface that is known exactly.
+/// An exact surface.
 #[derive(Clone, Debug)]
 pub enum Surface {
     /// A built-in scene.
     Scene(Scene),
-    /// A smooth mesh.
+    /// A mesh with interpolated normals.
     Mesh(Arc<Mesh>),
 }
 
 impl Surface {
-    /// First place where a ray meets the surface; `direction` has length one.
+    /// The first intersection of a ray with the surface. `direction` has length 1.
     pub fn trace(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         match self {
             Self::Scene(scene) => {

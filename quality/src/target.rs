@@ -1,27 +1,27 @@
-//! What the project wants of its pictures.
+//! The targets that the project sets for its pictures.
 
-use crate::measure::Angles;
+use crate::case::full;
 use crate::method::Method;
-use crate::motion::Change;
-use crate::run::Outcome;
+use crate::record::{POINTS, RecordedCase};
 
-/// Share of the surface that must be sampled for its silhouette to count.
-const SAMPLED: f64 = 0.85;
+/// Least share of the surface, in percent, that is sampled where the silhouette has a target.
+/// The border of sparser points is undefined.
+const MIN_SAMPLED_PERCENT: f64 = 85.0;
 
 /// The value of a method's picture of a case, if it has one.
-pub type Value = fn(&Outcome, Method) -> Option<f64>;
+pub type Value = fn(&RecordedCase<'_>, Method) -> Option<f64>;
 
-/// A limit, and how to tell on which side of it a case is.
+/// A limit for a value of each case.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
-    /// What is asked for, with the limit.
+    /// What the target asks for, with the limit.
     pub what: &'static str,
     limit: f64,
-    /// Whether more is better.
+    /// Whether greater values are better.
     more: bool,
-    /// Decimals worth showing.
+    /// Decimals to show.
     pub decimals: usize,
-    /// What is limited.
+    /// The value that is limited.
     pub value: Value,
 }
 
@@ -39,111 +39,87 @@ impl Target {
         if self.more { value >= self.limit } else { value <= self.limit }
     }
 
-    /// The worse of two values.
+    /// Whether `value` is worse than another.
     pub fn is_worse(&self, value: f64, than: f64) -> bool {
         if self.more { value < than } else { value > than }
+    }
+
+    /// Whether a method misses the target in a case. `None` if the target does not apply to the case.
+    pub fn is_missed(&self, case: &RecordedCase<'_>, method: Method) -> Option<bool> {
+        (self.value)(case, method).map(|value| !self.is_met(value))
     }
 }
 
 /// All targets.
 pub const TARGETS: [Target; 11] = [
-    Target::most("mean error of normals ≤ 1.15 × best fixed k", 1.15, 3, |outcome, method| {
-        ratio(outcome, method, |angles| angles.mean)
+    Target::most("mean error of normals ≤ 1.15 × best fit", 1.15, 2, |case, method| {
+        over_best_fit(case, method, "normals_mean_deg", "normals_mean_over_best_fit")
     }),
-    Target::most("the same near silhouettes ≤ 1.2 × best fixed k", 1.2, 3, |outcome, method| {
-        ratio(outcome, method, |angles| angles.band)
+    Target::most("the same near silhouettes ≤ 1.2 × best fit", 1.2, 2, |case, method| {
+        over_best_fit(case, method, "normals_band_deg", "normals_band_over_best_fit")
     }),
-    Target::most("flipped normals < 0.1 % of pixels", 0.1, 3, |outcome, method| {
-        outcome.of(method)?.angles.map(|a| 100.0 * a.flipped)
+    Target::most("flipped normals ≤ 0.1 %", 0.1, 2, |case, method| {
+        case.get("normals_flipped_percent", &method.name())
     }),
-    Target::most("holes ≤ 0.1 %", 0.1, 3, |outcome, method| Some(100.0 * outcome.of(method)?.cover.holes)),
-    Target::most("leaks ≤ 0.1 %", 0.1, 3, |outcome, method| Some(100.0 * outcome.of(method)?.cover.leaks)),
-    Target::least("silhouette IoU ≥ 0.995 where 85 % are sampled", 0.995, 4, |outcome, method| {
-        let cover = outcome.of(method)?.cover;
-        (cover.sampled >= SAMPLED).then_some(cover.iou)
+    Target::most("holes ≤ 0.1 %", 0.1, 3, |case, method| case.get("holes_percent", &method.name())),
+    Target::most("leaks ≤ 0.1 %", 0.1, 3, |case, method| case.get("leaks_percent", &method.name())),
+    Target::least("silhouette IoU ≥ 0.995 where 85 % are sampled", 0.995, 4, |case, method| {
+        let is_sampled = case.get("sampled_percent", POINTS)? >= MIN_SAMPLED_PERCENT;
+        case.get("iou", &method.name()).filter(|_| is_sampled)
     }),
-    Target::least("PSNR ≥ dots + 4 dB", 4.0, 2, |outcome, method| gain(outcome, method, Method::Dots)),
-    Target::least("PSNR ≥ paper + 1 dB without noise", 1.0, 2, |outcome, method| {
-        if outcome.case.recipe.is_noisy() { None } else { gain(outcome, method, Method::Paper) }
+    Target::least("PSNR ≥ dots + 4 dB", 4.0, 2, |case, method| gain(case, method, Method::Dots)),
+    Target::least("PSNR ≥ paper + 1 dB without noise", 1.0, 2, |case, method| {
+        if is_noisy(case) { None } else { gain(case, method, Method::Paper) }
     }),
-    Target::least("PSNR ≥ paper + 6 dB with noise", 6.0, 2, |outcome, method| {
-        if outcome.case.recipe.is_noisy() { gain(outcome, method, Method::Paper) } else { None }
+    Target::least("PSNR ≥ paper + 6 dB with noise", 6.0, 2, |case, method| {
+        if is_noisy(case) { gain(case, method, Method::Paper) } else { None }
     }),
-    Target::most("change of normals in motion ≤ truth + 10 %", 1.1, 3, |outcome, method| {
-        change(outcome, method, |change| change.degrees)
+    Target::most("change of normals in motion ≤ 1.1 × truth", 1.1, 2, |case, method| {
+        over_truth(case, method, "motion_normals_deg")
     }),
-    Target::most("change of lightness in motion ≤ truth + 10 %", 1.1, 3, |outcome, method| {
-        change(outcome, method, |change| change.lightness)
+    Target::most("change of lightness in motion ≤ 1.1 × truth", 1.1, 2, |case, method| {
+        over_truth(case, method, "motion_lightness_255ths")
     }),
 ];
 
-/// An error of a method's normals over that of the best plane fits.
-pub fn ratio(outcome: &Outcome, method: Method, value: fn(&Angles) -> f64) -> Option<f64> {
-    Some(value(outcome.of(method)?.angles.as_ref()?) / outcome.best_fit(value)?.1)
+/// An error of a method's normals over the lowest of the plane fits.
+fn over_best_fit(case: &RecordedCase<'_>, method: Method, error: &str, ratio_of_ours: &str) -> Option<f64> {
+    let ours = Method::Ours.name();
+    Some(case.get(ratio_of_ours, &ours)? * (case.get(error, &method.name())? / case.get(error, &ours)?))
 }
 
 /// Decibels that a method is ahead of another.
-fn gain(outcome: &Outcome, method: Method, other: Method) -> Option<f64> {
-    Some(outcome.of(method)?.psnr - outcome.of(other)?.psnr)
+fn gain(case: &RecordedCase<'_>, method: Method, other: Method) -> Option<f64> {
+    Some(case.get("psnr_db", &method.name())? - case.get("psnr_db", &other.name())?)
 }
 
-/// A change in our pictures over that in the true ones. Of no other method, as no other follows the pictures before.
-fn change(outcome: &Outcome, method: Method, value: fn(&Change) -> f64) -> Option<f64> {
-    let motion = outcome.motion.as_ref().filter(|_| method == Method::Ours)?;
-    let (_, ours) = motion.methods.iter().find(|(other, _)| *other == method)?;
-    Some(value(ours) / value(&motion.truth))
+/// A change in motion over that of the true pictures. Only ours have a target: no other method uses earlier pictures.
+fn over_truth(case: &RecordedCase<'_>, method: Method, change: &str) -> Option<f64> {
+    let ours = case.get(change, &method.name()).filter(|_| method == Method::Ours)?;
+    Some(ours / case.get(change, "truth")?)
+}
+
+/// Whether points lie beside the surface. Cases that are no longer measured count as free of noise.
+fn is_noisy(case: &RecordedCase<'_>) -> bool {
+    full().iter().any(|other| other.recipe.is_noisy() && other.name() == case.name)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::case::quick;
-    use crate::measure::{Measures, Swept};
-    use crate::page::page;
-    use crate::run::Motion;
-    use crate::still::Still;
-    use crate::verdict::Cover;
+    use crate::measure::{Angles, Measures};
+    use crate::motion::Change;
+    use crate::record::Record;
+    use crate::run::Outcome;
+    use crate::run::tests::outcome;
 
-    /// A case that we measured like this, the paper and dots worse, and plane fits like this.
-    fn outcome(ours: f64, fit: f64, psnr: f64) -> Outcome {
-        let cover =
-            Cover { spacing_px: 1.0, sampled: 1.0, iou: 0.999, wider_px: 0.0, holes: 0.0, leaks: 0.0, before: 0.0 };
-        let measures = |mean: f64, psnr| {
-            let angles = Angles {
-                mean,
-                median: mean,
-                rms: mean,
-                below_5: 1.0,
-                below_10: 1.0,
-                above_90: 0.0,
-                flipped: 0.0,
-                band: mean,
-            };
-            Measures { cover, swept: None, angles: Some(angles), depth_px: 0.1, psnr, flip: 0.1 }
-        };
-        let dots = Measures { angles: None, ..measures(0.0, 20.0) };
-        let methods = vec![
-            (Method::Ours, measures(ours, psnr)),
-            (Method::Paper, measures(9.0, 28.0)),
-            (Method::Dots, dots),
-            (Method::Fit(10), measures(2.0 * fit, 28.0)),
-            (Method::Fit(40), measures(fit, 28.0)),
-        ];
-        let change = |degrees| Change { degrees, lightness: 1.0 };
-        let motion = Motion {
-            truth: change(1.0),
-            smooth: 1.0,
-            methods: vec![(Method::Ours, change(ours))],
-            alone: change(ours),
-            degrees_off: [1.0; 2],
-        };
-        let still = Still { one_ray: 40.0, still: 33.0, methods: vec![(Method::Ours, psnr)] };
-        Outcome { case: quick()[0], measures: methods, still, motion: Some(motion) }
-    }
-
+    /// The targets that ours misses in one case.
     fn missed(outcome: &Outcome) -> Vec<&'static str> {
-        let is_missed =
-            |target: &&Target| (target.value)(outcome, Method::Ours).is_some_and(|value| !target.is_met(value));
+        let record = Record::new("0123456789ab".into(), std::slice::from_ref(outcome));
+        let (name, values) = record.cases.iter().next().expect("a case");
+        let case = RecordedCase { name, values };
+        let is_missed = |target: &&Target| target.is_missed(&case, Method::Ours) == Some(true);
         TARGETS.iter().filter(is_missed).map(|target| target.what).collect()
     }
 
@@ -156,9 +132,9 @@ mod tests {
         assert_eq!(dark, ["PSNR ≥ dots + 4 dB", "PSNR ≥ paper + 1 dB without noise"], "colours");
     }
 
-    /// Each target is missed by what is bad in its way, and by nothing else.
+    /// Each defect makes a picture miss its own target, and no other.
     #[test]
-    fn each_is_missed_by_what_it_is_for() {
+    fn each_target_notices_its_own_defect() {
         fn angles(measures: &mut Measures) -> &mut Angles {
             measures.angles.as_mut().expect("normals")
         }
@@ -201,31 +177,5 @@ mod tests {
             assert!(target.what.starts_with(what), "{what}, {}", target.what);
             assert_eq!(missed(outcome), [target.what]);
         }
-    }
-
-    #[test]
-    fn the_page_says_the_worst() {
-        let with_known = |mut outcome: Outcome, mean: f64| {
-            let (_, ours) = outcome.measures[0];
-            let angles = ours.angles.map(|angles| Angles { mean, ..angles });
-            outcome.measures.push((Method::Known, Measures { angles, ..ours }));
-            outcome
-        };
-        // The second is missed by what is known as well, the third not.
-        let outcomes = [(1.0, 1.0), (1.5, 1.4), (2.0, 1.0)];
-        let outcomes = outcomes.map(|(ours, known)| with_known(outcome(ours, 1.0, 30.0), known));
-        let page = page(&outcomes, &["figure".into()]);
-        let line = page.lines().find(|line| line.contains(TARGETS[0].what)).expect("a line for each target");
-        assert!(line.contains("| 1 of 3 | 2.000 |") && line.ends_with("| missed | 2 of 3 | 1 | 0 |"), "{line}");
-        assert!(page.contains("![figure](quality/figure.png)") && !page.contains("NaN"), "{page}");
-        assert!(!page.contains("## Swept points"), "no section about what there is none of");
-    }
-
-    #[test]
-    fn the_page_tells_what_is_closed() {
-        let mut outcome = outcome(1.0, 1.0, 30.0);
-        outcome.measures[0].1.swept = Some(Swept { seen: 0.5, closed: 0.875, right: 0.75, over: 0.125 });
-        let page = page(&[outcome], &[]);
-        assert!(page.contains("| 50.0 | 87.50 | – | – | 75.00 | – | – | 12.50 | – | – |"), "{page}");
     }
 }

@@ -1,4 +1,4 @@
-//! What is right and wrong at each pixel, and how much of each there is.
+//! Verdicts on pixels: what is right and wrong, and how often.
 
 use autosplats::cloud::glam::DVec3;
 use rayon::prelude::*;
@@ -7,72 +7,72 @@ use crate::exact::{Exact, Seen};
 use crate::picture::{Picture, Shown};
 use crate::subject::Subject;
 
-/// Pixels to all sides that a surface must truly cover around a pixel for it to lie inside the silhouette.
+/// A pixel lies inside the silhouette if the true surface covers all pixels within this distance in x and in y.
 const INSIDE_PX: usize = 2;
-/// Fewest sampled pixels that say something about a picture.
+/// Fewest sampled pixels inside the silhouette from which shares are computed.
 const FEWEST: usize = 300;
 
-/// What is to be said about a pixel.
+/// The verdict on a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Empty, and so it should be.
+    /// Empty, like the true picture.
     Empty,
-    /// A surface with too few points to ask anything about it, or something of such a surface shown where nothing is.
+    /// Points are too sparse for a verdict: on the true surface, or on one drawn where none is.
     Unsampled,
-    /// Shown where it is.
+    /// Covered at the true depth.
     Right,
-    /// Empty inside the silhouette.
+    /// Empty, but inside the true silhouette.
     Hole,
-    /// Empty at the silhouette's edge.
+    /// Empty, but at the edge of the true silhouette.
     Short,
-    /// Covered outside the silhouette.
+    /// Covered, but outside the true silhouette.
     Over,
-    /// Behind all that is truly seen at this pixel and the eight around it, each of which sees some surface, by more than
-    /// the tolerance there. At a step in depth either side may be seen.
+    /// Behind the true surfaces at the pixel and the eight around it by more than the tolerance. All nine must have
+    /// one. The eight count because at a step in depth either side may be drawn.
     Leak,
-    /// Before all that is truly seen at this pixel and the eight around it, by more than the tolerance there.
+    /// In front of the true surfaces at the pixel and the eight around it, by more than the tolerance.
     Before,
-    /// At another depth than it should be by more than the tolerance, but at one that is seen beside it.
+    /// Off the true depth by more than the tolerance, but neither [`Leak`](Self::Leak) nor [`Before`](Self::Before).
     Beside,
 }
 
-/// The verdict on each pixel.
+/// The verdicts on all pixels of a picture.
 #[derive(Clone, Debug)]
 pub struct Verdicts {
-    /// Row by row.
+    /// Verdicts, in rows of pixels.
     pub verdicts: Vec<Verdict>,
-    /// Sampled pixels inside the silhouette.
+    /// Number of sampled pixels inside the true silhouette.
     inside: usize,
-    /// Sampled pixels at its edge.
+    /// Number of sampled pixels at the edge of the true silhouette.
     edge: usize,
-    /// Median over the surface, where there are points.
+    /// Median spacing of points over the surface, pixels. Pixels without a finite spacing are left out.
     spacing_px: f64,
-    /// Share of the surface that is sampled.
+    /// Share of the true surface's pixels that is sampled.
     sampled: f64,
 }
 
-/// How much of a picture is where it should be, as shares of the pixels whose surface is sampled. No numbers where there
-/// are too few of those.
+/// How well a picture covers the true surface. Shares are of pixels whose surface is sampled: its points are at most
+/// 1.5 pixels apart. Values are NaN if too few pixels are.
 #[derive(Clone, Copy, Debug)]
 pub struct Cover {
-    /// Median distance of points on the surface seen; of swept ones where the sensor sees it.
+    /// Median spacing of points on the visible surface, pixels. For a lidar only where the lidar sees the surface.
     pub spacing_px: f64,
-    /// Share of the true surface that is sampled; the rest is left out of all that follows.
+    /// Share of the true surface that is sampled. The other values leave out the rest.
     pub sampled: f64,
-    /// Intersection over union of the covered pixels.
+    /// Intersection over union of the covered pixels with the true ones.
     pub iou: f64,
-    /// Pixels by which the silhouette is too wide on average; below 0 if too narrow.
+    /// Mean excess width of the silhouette, pixels. Negative if it is too narrow.
     pub wider_px: f64,
-    /// Of the pixels inside the true silhouette, those that are empty.
+    /// Share of empty pixels inside the true silhouette, at least two pixels from its edge.
     pub holes: f64,
-    /// Of the pixels covered in both, those that show something behind the surface.
+    /// Share of pixels behind the true surface, of those covered in both pictures.
     pub leaks: f64,
-    /// The same for something before it.
+    /// Share of pixels in front of the true surface, of those covered in both pictures.
     pub before: f64,
 }
 
 impl Verdicts {
-    /// Judges each pixel of `picture`.
+    /// Judges all pixels of `picture`.
     pub fn new(exact: &Exact, picture: &Picture, subject: &Subject) -> Self {
         let judge = |pixel: usize| match (&exact.seen[pixel], &picture.shown[pixel]) {
             (None, None) => Verdict::Empty,
@@ -97,7 +97,7 @@ impl Verdicts {
         }
     }
 
-    /// How much of each there is.
+    /// Counts the verdicts.
     pub fn cover(&self) -> Cover {
         let count = |what: &[Verdict]| self.verdicts.iter().filter(|verdict| what.contains(verdict)).count() as f64;
         let [right, leaks, before] = [Verdict::Right, Verdict::Leak, Verdict::Before].map(|what| count(&[what]));
@@ -115,11 +115,11 @@ impl Verdicts {
         }
     }
 
-    /// Mean angles in degrees of the normals shown where they should be, and of plane fits at the points shown there, to
-    /// the true ones; of either sign.
+    /// Mean angles to the true normals in degrees, over all right pixels: of the drawn normals, and of plane fits at
+    /// the drawn points. The sign of normals does not count.
     pub fn normals_and_fits(&self, exact: &Exact, picture: &Picture, subject: &Subject) -> [f64; 2] {
         let degrees = |normal: DVec3, truth: DVec3| {
-            // The angle's sine is exact where its cosine is not.
+            // The sine is precise at small angles, unlike the cosine.
             normal.cross(truth).length().atan2(normal.dot(truth).abs()).to_degrees()
         };
         let right = (0..self.verdicts.len()).into_par_iter().filter(|&pixel| self.verdicts[pixel] == Verdict::Right);
@@ -136,7 +136,7 @@ fn inside(exact: &Exact, pixel: usize) -> bool {
     exact.around(pixel, INSIDE_PX).all(|seen| seen.is_some())
 }
 
-/// The verdict where there is a surface and one is shown.
+/// The verdict where both pictures show a surface.
 fn compare(exact: &Exact, pixel: usize, seen: &Seen, shown: &Shown) -> Verdict {
     let tolerance = seen.tolerance;
     if (shown.depth - seen.depth).abs() <= tolerance {

@@ -19,8 +19,11 @@ usage: cargo xtask test               everything that a change has to pass: rule
        cargo xtask rules              of these what takes seconds: format, imports, lengths, dependencies
        cargo xtask peers              of the tests those of Zenoh and with programs of others, for which it gets a Python
        cargo xtask fuzz [OPTIONS]     broken files for every reader, as long as wanted; --help tells the options
-       cargo xtask quality [OPTIONS]  docs/QUALITY.md, from pictures held against the exact surface, in some ten minutes;
-                                  --quick and --only NAME take some of them, --out DIR writes elsewhere
+       cargo xtask quality [OPTIONS]  measures pictures against exact surfaces, in ten minutes, prints what changed since
+                                  docs/quality/measures.json, and writes that file and docs/QUALITY.md anew unless an
+                                  error grew by more than 3 %; --quick and --only NAME measure some cases; see --help
+       cargo xtask quality --compare BEFORE AFTER
+                                  what changed between two such files; fails if an error grew by more than 3 %
        cargo xtask formats            docs/FORMATS.md, from what the program says of its formats and of the test data;
                                   with --check only whether it is what this build makes
        cargo xtask pictures OUT [--program PATH]
@@ -76,7 +79,7 @@ fn fuzz(root: &Path, options: &[&str]) -> Result<()> {
     cargo(root, &[&["run", "--locked", "--quiet", "-p", "autosplats-fuzz", "--"], options].concat())
 }
 
-/// Pictures against the exact surface. Its tests measure the small cases; this is built for speed, to measure all.
+/// Pictures against exact surfaces. Built for speed, as all cases are measured; the tests measure the small ones.
 fn quality(root: &Path, options: &[&str]) -> Result<()> {
     cargo(root, &[&["run", "--locked", "--quiet", "--release", "-p", "autosplats-quality", "--"], options].concat())
 }

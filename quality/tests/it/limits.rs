@@ -1,7 +1,7 @@
-//! The small cases, held to what was measured when the limits were last set: pictures may get better, not worse.
+//! Limits for the measures of the small cases: pictures may get better, but not worse.
 //!
-//! `cargo test -p autosplats-quality --test it limits:: -- --nocapture` prints what was measured. The last tests spoil pictures,
-//! each in a way that one of the measures is for, which then has to notice.
+//! `cargo test -p autosplats-quality --test it limits:: -- --nocapture` prints all measures. Further tests spoil a
+//! picture, each by one kind of defect, and expect the measures of that defect to miss their limits.
 
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
@@ -17,37 +17,41 @@ use autosplats_quality::random::Random;
 use autosplats_quality::run::{Pictures, measure};
 use autosplats_quality::still::Still;
 use autosplats_quality::subject::Subject;
-use autosplats_quality::target::ratio;
 
-/// What a case has to keep. Angles in degrees, shares in percent; what has no number is not looked at.
+/// The limits of a case. Angles are in degrees, shares in percent. NaN is no limit.
 struct Limits {
     case: &'static str,
-    /// Mean error of normals, all and near silhouettes.
+    /// Greatest mean errors of normals: over all pixels, and near silhouettes.
     normals: [f64; 2],
-    /// The same over those of the best plane fits.
+    /// Greatest ratios of these errors to those of the best plane fits.
     ratios: [f64; 2],
-    /// Shares above 90°: to the true normal, and to all that is truly seen around.
+    /// Greatest shares of normals above 90° to the true one, and to all true ones around.
     flipped: [f64; 2],
+    /// Greatest share of holes.
     holes: f64,
+    /// Greatest share of leaks.
     leaks: f64,
+    /// Greatest share of surfaces in front.
     before: f64,
-    /// At least.
+    /// Least intersection over union.
     iou: f64,
+    /// Greatest mean error in depth, pixels.
     depth_px: f64,
-    /// At least.
+    /// Least PSNR, decibels.
     psnr: f64,
+    /// Greatest mean FLIP error.
     flip: f64,
-    /// Of what the sensor of a sweep sees, at least closed and right, at most over.
+    /// Of a lidar: least shares closed and right, greatest share over.
     swept: [f64; 3],
-    /// Changes of normals and lightness in motion, over those in the true pictures.
+    /// Greatest ratios of the changes of normals and lightness in motion to those of the true pictures.
     motion: [f64; 2],
-    /// What a still gains at least over a single picture against the truth of many rays, decibels.
+    /// Least gain of a still over a single picture in PSNR against the truth of 16 rays, decibels.
     still: f64,
 }
 
 const NONE: f64 = f64::NAN;
 
-/// One line for each case. Set anew when pictures got better: what was measured, with a few percent to spare.
+/// One line for each case: measured values with a few percent to spare. Better pictures call for tighter limits.
 #[rustfmt::skip]
 const LIMITS: [Limits; 9] = [
     Limits { case: "figure:60K own", normals: [6.3, 7.9], ratios: [1.05, 1.05], flipped: [0.62, 0.07], holes: 0.02, leaks: 0.02, before: 0.25, iou: 0.982, depth_px: 0.39, psnr: 24.6, flip: 0.074, swept: [NONE; 3], motion: [1.18, 1.01], still: 3.1 },
@@ -61,7 +65,7 @@ const LIMITS: [Limits; 9] = [
     Limits { case: "herd:32x1024 behind", normals: [11.2, 37.3], ratios: [0.69, 0.95], flipped: [2.75, 1.6], holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 3.6, psnr: 19.4, flip: 0.156, swept: [98.6, 92.7, 10.0], motion: [NONE; 2], still: 0.0 },
 ];
 
-/// What of a picture is beyond its limits.
+/// The limits that a picture misses.
 fn misses(measures: &Measures, limits: &Limits) -> Vec<String> {
     let angles = measures.angles.expect("a method that knows normals");
     let cover = measures.cover;
@@ -73,7 +77,7 @@ fn misses(measures: &Measures, limits: &Limits) -> Vec<String> {
         ("holes", 100.0 * cover.holes, limits.holes),
         ("leaks", 100.0 * cover.leaks, limits.leaks),
         ("before", 100.0 * cover.before, limits.before),
-        // Turned round, at least is at most.
+        // A least value, negated, is a greatest one.
         ("IoU", -cover.iou, -limits.iou),
         ("depth", measures.depth_px, limits.depth_px),
         ("PSNR", -measures.psnr, -limits.psnr),
@@ -86,13 +90,13 @@ fn misses(measures: &Measures, limits: &Limits) -> Vec<String> {
     [beyond(&most), beyond(&most_swept)].concat()
 }
 
-/// Those of some values that are above their limit, or no number though there is a limit.
+/// The values that are above their limit, or NaN although there is a limit.
 fn beyond(values: &[(&str, f64, f64)]) -> Vec<String> {
     let is_beyond = |(_, value, limit): &&(&str, f64, f64)| !limit.is_nan() && !(value <= limit);
     values.iter().filter(is_beyond).map(|(what, value, limit)| format!("{what}: {value:.4}, limit {limit}")).collect()
 }
 
-/// Errors of normals over those of the best plane fits that are beyond their limits.
+/// The limits that the ratios of errors of normals miss.
 fn ratio_misses([all, band]: [f64; 2], limits: &Limits) -> Vec<String> {
     beyond(&[
         ("normals over best fits", all, limits.ratios[0]),
@@ -100,7 +104,7 @@ fn ratio_misses([all, band]: [f64; 2], limits: &Limits) -> Vec<String> {
     ])
 }
 
-/// A change in motion that is beyond its limits.
+/// The limits that the changes in motion miss.
 fn motion_misses(ours: Change, truth: Change, limits: &Limits) -> Vec<String> {
     beyond(&[
         ("turning", ours.degrees / truth.degrees, limits.motion[0]),
@@ -108,7 +112,7 @@ fn motion_misses(ours: Change, truth: Change, limits: &Limits) -> Vec<String> {
     ])
 }
 
-/// What a still gains over a single picture against the truth of many rays, in decibels, that is beyond its limit.
+/// The limit that a still's gain in decibels misses.
 fn still_misses(gain: f64, limits: &Limits) -> Vec<String> {
     beyond(&[("still", -gain, -limits.still)])
 }
@@ -122,10 +126,10 @@ fn a_still_that_gains_less_is_found() {
 }
 
 fn limits_of(case: &Case) -> &'static Limits {
-    LIMITS.iter().find(|limits| limits.case == case.name()).expect("limits for each case")
+    LIMITS.iter().find(|limits| limits.case == case.name()).expect("every case has limits")
 }
 
-/// Measures a case and holds it to its limits.
+/// Measures a case and checks its limits.
 fn hold(name: &str) {
     let case = quick().into_iter().find(|case| case.name() == name).expect("a case of this name");
     let limits = limits_of(&case);
@@ -136,7 +140,7 @@ fn hold(name: &str) {
     let (outcome, _) = measure(&case, &subject, &mut painter, &methods).expect("a measured case");
     let measures = outcome.of(Method::Ours).expect("our picture");
     let values: [fn(&Angles) -> f64; 2] = [|angles| angles.mean, |angles| angles.band];
-    let ratios = values.map(|value| ratio(&outcome, Method::Ours, value).expect("plane fits"));
+    let ratios = values.map(|value| outcome.over_best_fit(Method::Ours, value).expect("plane fits"));
     println!("{name}: {measures:.3?}\n{ratios:.3?}\n{:.3?}", outcome.motion);
     let mut found = misses(measures, limits);
     found.extend(ratio_misses(ratios, limits));
@@ -193,7 +197,7 @@ fn herd_swept() {
     hold("herd:32x1024 behind");
 }
 
-/// Without what is adapted to noise the limits would not be met.
+/// The paper's settings, which do not adapt to noise, miss the limits.
 #[test]
 fn the_papers_settings_are_not_enough_for_noise() {
     for name in ["bumpy:200K-noise0.3% front", "bumpy:200K-outliers2% front"] {
@@ -206,7 +210,7 @@ fn the_papers_settings_are_not_enough_for_noise() {
     }
 }
 
-/// Or the column about it would tell nothing of what is in reach.
+/// [`Method::Known`] shows what exact normals and places can reach, so it must be near the truth.
 #[test]
 fn what_is_known_is_nearly_the_truth() {
     let name = "bumpy:200K-noise0.3% front";
@@ -216,17 +220,17 @@ fn what_is_known_is_nearly_the_truth() {
     let (outcome, _) = measure(&case, &subject, &mut painter, &[Method::Ours, Method::Known]).expect("a measured case");
     let [ours, known] = [Method::Ours, Method::Known].map(|method| outcome.of(method).expect("a picture"));
     let [far, near] = [ours, known].map(|measures| measures.angles.expect("normals").mean);
-    assert!(near < 1.0 && near < 0.2 * far, "normals are {near} degrees off, ours {far}");
+    assert!(near < 1.0 && near < 0.2 * far, "errors of normals are {near}°, ours {far}°");
     assert!(known.psnr > ours.psnr + 10.0, "{} dB, ours {}", known.psnr, ours.psnr);
 }
 
 #[test]
 fn every_case_has_its_line() {
     let names: Vec<_> = quick().iter().map(Case::name).collect();
-    assert_eq!(names, LIMITS.map(|limits| limits.case), "a line for each case, and no other");
+    assert_eq!(names, LIMITS.map(|limits| limits.case), "every case has one line");
 }
 
-/// A good picture to be spoilt.
+/// A good picture to spoil.
 struct Sample {
     subject: Subject,
     limits: &'static Limits,
@@ -249,7 +253,7 @@ impl Sample {
         &self.pictures.drawn[0].1
     }
 
-    /// What is beyond the limits of a picture.
+    /// The limits that `picture` misses, lit anew.
     fn misses(&self, picture: &Picture) -> String {
         let lit = Lit::new(picture, &self.pictures.truth.exact.rays);
         self.lit_misses(picture, &lit)
@@ -259,7 +263,7 @@ impl Sample {
         misses(&self.pictures.truth.measure(picture, lit, &self.subject), self.limits).join("\n")
     }
 
-    /// The picture with one in so many of its pixels changed.
+    /// The limits that the picture misses if one in `one_in` of its pixels is changed.
     fn spoilt(&self, one_in: usize, change: impl Fn(Shown) -> Option<Shown>) -> String {
         let is_chosen = |pixel| Random::new(5, pixel).unit() < 1.0 / one_in as f64;
         self.misses(&self.picture().changed(|pixel, shown| if is_chosen(pixel) { change(shown) } else { Some(shown) }))
@@ -270,21 +274,24 @@ impl Sample {
 fn notices(misses: &str, what: &[&str]) {
     println!("{misses}\n");
     for what in what {
-        assert!(misses.contains(what), "{what} should be noticed, not only:\n{misses}");
+        assert!(misses.contains(what), "{what} should miss its limit, found:\n{misses}");
     }
 }
 
 #[test]
 fn a_good_picture_misses_nothing() {
     let sample = sample();
-    assert_eq!(sample.misses(sample.picture()), "", "else the next tests would say nothing");
+    assert_eq!(sample.misses(sample.picture()), "", "the next tests need a good picture");
     let truth = Picture::truth(&sample.pictures.truth.exact);
     let lit = Lit::new(&truth, &sample.pictures.truth.exact.rays);
-    // Of the truth nobody knows the points, so its cover is judged where it covers, which is everywhere.
+    // A true picture has no points. None are needed, as its cover is complete.
     let measures = sample.pictures.truth.measure(&truth, &lit, &sample.subject);
     let angles = measures.angles.expect("normals");
-    assert!(angles.rms < 1e-9 && measures.depth_px == 0.0 && measures.flip < 1e-6, "the truth is true: {measures:?}");
-    assert!(measures.psnr.is_infinite() && measures.cover.iou == 1.0, "the truth is true: {measures:?}");
+    assert!(
+        angles.rms < 1e-9 && measures.depth_px == 0.0 && measures.flip < 1e-6,
+        "the true picture has no errors: {measures:?}"
+    );
+    assert!(measures.psnr.is_infinite() && measures.cover.iou == 1.0, "the true picture has no errors: {measures:?}");
 }
 
 #[test]
@@ -303,7 +310,7 @@ fn flipped_normals_are_noticed() {
 fn tilted_normals_are_noticed() {
     let tilt = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0_f64.to_radians());
     notices(&sample().spoilt(2, |shown| Some(Shown { normal: tilt * shown.normal, ..shown })), &["normals:"]);
-    // A quarter of those near silhouettes are too few to be noticed among all.
+    // A quarter of the pixels near silhouettes is too few to change the mean over all pixels.
     let sample = sample();
     let band = sample.pictures.truth.exact.band();
     let tilted = sample.picture().changed(|pixel, shown| {
@@ -312,7 +319,7 @@ fn tilted_normals_are_noticed() {
     });
     let misses = sample.misses(&tilted);
     notices(&misses, &["normals near silhouettes:"]);
-    assert!(!misses.contains("normals:"), "all but a few are right: {misses}");
+    assert!(!misses.contains("normals:"), "most normals are right: {misses}");
 }
 
 #[test]
@@ -331,13 +338,13 @@ fn what_is_open_or_closed_wrongly_between_rings_is_noticed() {
     let mut painter = Painter::new(&subject);
     let (_, pictures) = measure(&case, &subject, &mut painter, &[Method::Ours]).expect("a measured case");
     let sample = Sample { subject, limits: limits_of(&case), pictures };
-    assert_eq!(sample.misses(sample.picture()), "", "else the rest would say nothing");
+    assert_eq!(sample.misses(sample.picture()), "", "the rest needs a good picture");
     notices(&sample.spoilt(20, |_| None), &["closed"]);
     let back = |shown: Shown| Some(Shown { depth: shown.depth + 0.3 * sample.subject.diagonal, ..shown });
     let misses = sample.spoilt(20, back);
     notices(&misses, &["right"]);
-    assert!(!misses.contains("closed"), "it is covered: {misses}");
-    // A screen before everything.
+    assert!(!misses.contains("closed"), "all pixels are covered: {misses}");
+    // A screen in front of everything.
     let near = Shown { depth: 0.5, normal: DVec3::Y, point: 0 };
     let all = Picture { width: sample.picture().width, shown: vec![Some(near); sample.picture().shown.len()] };
     notices(&sample.misses(&all), &["over", "right"]);
@@ -380,9 +387,9 @@ fn a_jittering_picture_is_noticed() {
     let sample = sample();
     let exact = &sample.pictures.truth.exact;
     let limits = Limits { motion: [1.1, 1.1], ..*limits_of_first() };
-    // The camera stands still, so each pixel shows what it showed; normals wobble by two degrees.
+    // The camera does not move, so each pixel shows the same point. Normals wobble by two degrees.
     let pairs = same(exact, exact);
-    assert!(pairs.len() > 10_000 && pairs.iter().all(|(from, to)| from == to), "nothing moves");
+    assert!(pairs.len() > 10_000 && pairs.iter().all(|(from, to)| from == to), "every pixel shows the same point");
     let wobbling = |step: usize| {
         sample.picture().changed(|pixel, shown| {
             let turn = TAU * Random::new(7 + step as u64, pixel).unit();
@@ -399,12 +406,12 @@ fn a_jittering_picture_is_noticed() {
         changes.mean()
     };
     let still = change(&[sample.picture().clone(), sample.picture().clone()]);
-    assert_eq!(still, Change { degrees: 0.0, lightness: 0.0 }, "a picture does not differ from itself");
+    assert_eq!(still, Change { degrees: 0.0, lightness: 0.0 }, "equal pictures have no change");
     let wobble = change(&[wobbling(0), wobbling(1), wobbling(2)]);
-    // What the truth of a moving camera changes by, about.
+    // About the change of true pictures of a moving camera.
     let truth = Change { degrees: 0.5, lightness: 0.5 };
     notices(&motion_misses(wobble, truth, &limits).join("\n"), &["turning", "flicker"]);
-    assert!(motion_misses(truth, truth, &limits).is_empty(), "what changes like the truth is right");
+    assert!(motion_misses(truth, truth, &limits).is_empty(), "a change like the truth's is within the limits");
 }
 
 fn limits_of_first() -> &'static Limits {
