@@ -1,4 +1,4 @@
-//! The list of what is measured.
+//! The list of cases.
 
 use autosplats::ViewDirection::{Back, Front, Iso, Left, Top};
 
@@ -6,24 +6,25 @@ use crate::subject::{BUNNY, DANCER, Density, HORSE, Recipe, Source};
 use crate::sweep::Sweep;
 use crate::view::Shot;
 
-/// The edge of the herd's meadow, where a sensor stands as high as on a car, and the view from behind it.
+/// Sensor position at the edge of the herd's meadow, as high as on a car, metres.
 const EDGE: [f64; 3] = [1.2, -6.9, 1.75];
+/// View from behind the sensor at the meadow's edge.
 const BEHIND_EDGE: Shot = Shot::Behind([2.7, 1.35], [0.3, -2.0, 0.5]);
-/// A sensor of few beams there.
+/// A sensor of 32 beams at the edge of the meadow.
 const FEW_BEAMS: Sweep = Sweep::new(EDGE, [-30.67, 10.67], 32, 1024);
 
 /// A subject and a view of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
-    /// What is drawn.
+    /// How to make the subject.
     pub recipe: Recipe,
-    /// From where.
+    /// The view.
     pub shot: Shot,
-    /// Of the picture, pixels.
+    /// Width and height of the picture, pixels.
     pub size: [u32; 2],
-    /// Whether the camera moves as well.
+    /// Whether motion is measured too.
     pub motion: bool,
-    /// Whether it is a row of the contact sheets.
+    /// Whether the case is a row of the contact sheets.
     pub sheet: bool,
 }
 
@@ -40,13 +41,13 @@ impl Case {
         Self { sheet: true, ..self }
     }
 
-    /// A short name for subject and view.
+    /// Names of subject and view, separated by a space.
     pub fn name(&self) -> String {
         format!("{} {}", self.recipe.name(), self.shot.name())
     }
 }
 
-/// Everything, as `cargo xtask quality` measures it.
+/// All cases, those of [`quick`] among them.
 pub fn full() -> Vec<Case> {
     let scene = |name, count| Recipe::new(Source::Scene(name), count);
     let [figure, two_scales, statue] =
@@ -59,7 +60,7 @@ pub fn full() -> Vec<Case> {
     let ear = [0.40, 0.30];
     let meadow = |sweep| Recipe::swept(Source::Scene("herd"), sweep);
     let nave = |sweep| Recipe::swept(Source::Scene("cathedral"), sweep);
-    // A car's sensors at the meadow's edge, a robot's in the nave.
+    // A car's sensor at the meadow's edge and a robot's in the nave.
     let many = Sweep::new(EDGE, [-24.8, 2.0], 64, 2048);
     let wide = Sweep::new([-5.7, -0.15, 1.75], [-45.0, 45.0], 64, 2048);
     let behind_nave = Shot::Behind([3.0, 0.9], [3.0, 0.5, 2.6]);
@@ -104,14 +105,14 @@ pub fn full() -> Vec<Case> {
         case(dancer, Shot::Whole(Front)).shown(),
         case(dancer.noise(0.001).density(Density::Uneven), Shot::Whole(Front)).shown(),
     ];
-    // In a smaller picture one is the same.
+    // The herd under 32 beams is in both lists: the larger picture stays.
     let small = quick().into_iter().filter(|small| cases.iter().all(|case| case.name() != small.name()));
     let small: Vec<_> = small.map(|case| Case { sheet: false, ..case }).collect();
     cases.extend(small);
     cases
 }
 
-/// Small cases that need nothing but the repository, in small pictures: points are sparser on their surfaces.
+/// Small cases of few points and small pictures. They read no meshes, so the tests run everywhere.
 pub fn quick() -> Vec<Case> {
     let scene = |name, count| Recipe::new(Source::Scene(name), count);
     let bumpy = Recipe::new(Source::Bumpy(6), 200_000);

@@ -1,44 +1,47 @@
-//! FLIP: how different two pictures look to somebody who flips between them.
+//! FLIP: how different two pictures look to a viewer who alternates between them.
 //!
-//! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild: *FLIP: A Difference Evaluator for Alternating Images.*
-//! Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2), 2020. doi:10.1145/3406183. The form for
-//! pictures of low dynamic range; numbers of sections are the paper's.
+//! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild: *FLIP: A Difference Evaluator for Alternating
+//! Images.* Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2), 2020. doi:10.1145/3406183.
+//! This is the form for pictures of low dynamic range. Section numbers are those of the FLIP paper.
 
 use rayon::prelude::*;
 
-/// Pixels per degree of sight: a 4K screen 70 cm wide at 70 cm, the authors' usual one.
+/// Pixels per degree of view: a 4K screen 70 cm wide at a distance of 70 cm, the authors' default.
 const PIXELS_PER_DEGREE: f64 = 67.0;
-/// §4.1: contrast sensitivity of the three opponent channels, each a sum of Gaussians of weight and spread.
+/// §4.1: contrast sensitivity of the three opponent channels. Each is a sum of Gaussians of these weights and spreads.
 const SENSITIVITY: [&[[f64; 2]]; 3] = [&[[1.0, 0.0047]], &[[1.0, 0.0053]], &[[34.1, 0.04], [13.5, 0.025]]];
-/// The widest spread of those.
+/// Greatest spread in [`SENSITIVITY`].
 const WIDEST: f64 = 0.04;
-/// §4.1: exponent of differences in colour, and the two parts that they are mapped to.
+/// §4.1: exponent of differences in colour.
 const EXPONENT: f64 = 0.7;
+/// §4.1: difference in colour between the two linear parts of the error, as a share of the greatest difference.
 const KNEE: f64 = 0.4;
+/// §4.1: error at [`KNEE`].
 const KNEE_ERROR: f64 = 0.95;
-/// §4.2: width of features in degrees, and the exponent of their differences.
+/// §4.2: width of features, degrees.
 const FEATURE_WIDTH: f64 = 0.082;
+/// §4.2: exponent of differences between features.
 const FEATURE_EXPONENT: f64 = 0.5;
-/// White of D65.
+/// XYZ of the white of illuminant D65.
 const WHITE: [f64; 3] = [0.950_428_545, 1.0, 1.088_900_371];
 
-/// A truth that pictures are compared with.
+/// A truth, prepared for comparisons with pictures.
 #[derive(Debug)]
 pub struct Flip {
     width: usize,
     truth: Prepared,
-    /// The greatest difference there is, between green and blue.
+    /// The greatest difference in colour: that of green and blue.
     most: f64,
 }
 
 impl Flip {
-    /// Takes a truth, sRGB 0 to 1, row by row.
+    /// Prepares a truth of rows of `width` pixels, sRGB, 0 to 1.
     pub fn new(truth: &[[f64; 3]], width: usize) -> Self {
         let [green, blue] = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|color| hunt(lab(to_xyz(color))));
         Self { width, truth: Prepared::new(truth, width), most: hyab(green, blue).powf(EXPONENT) }
     }
 
-    /// The difference of a picture of the same size at each pixel, 0 to 1.
+    /// The error of a picture of the same size at each pixel, 0 to 1.
     pub fn errors(&self, picture: &[[f64; 3]]) -> Vec<f64> {
         let [ours, theirs] = [&Prepared::new(picture, self.width), &self.truth];
         let knee = KNEE * self.most;
@@ -57,12 +60,12 @@ impl Flip {
     }
 }
 
-/// What is compared of a picture.
+/// A picture, prepared for comparisons.
 #[derive(Debug)]
 struct Prepared {
-    /// L*a*b* after what the eye blurs, adjusted for lightness.
+    /// L*a*b* colours, blurred as by the eye and adjusted by the Hunt effect.
     colors: Vec<[f64; 3]>,
-    /// Strength of edges and of points.
+    /// Strengths of edges and of points.
     features: Vec<[f64; 2]>,
 }
 
@@ -73,7 +76,7 @@ impl Prepared {
         let channels: [Vec<f64>; 3] = [0, 1, 2].map(|i| blurred(&opponents, i, width));
         let color = |pixel: usize| {
             let xyz = from_opponent([0, 1, 2].map(|i| channels[i][pixel]));
-            // What no screen shows is cut off.
+            // Colours that no screen shows are clamped.
             let rgb = to_rgb(xyz).map(|channel| channel.clamp(0.0, 1.0));
             hunt(lab(to_xyz(rgb)))
         };
@@ -82,11 +85,11 @@ impl Prepared {
     }
 }
 
-/// §4.1: one opponent channel as the eye sees it.
+/// §4.1: one opponent channel, blurred by the eye's contrast sensitivity.
 fn blurred(opponents: &[[f64; 3]], channel: usize, width: usize) -> Vec<f64> {
     let values: Vec<f64> = opponents.par_iter().map(|color| color[channel]).collect();
     let radius = (3.0 * (WIDEST / (2.0 * std::f64::consts::PI.powi(2))).sqrt() * PIXELS_PER_DEGREE).ceil() as isize;
-    // Each Gaussian is a product of one across and one down; weights are such that all sum up to one.
+    // Each Gaussian is separable. Weights make the sum of the whole filter 1.
     let parts = SENSITIVITY[channel].iter().map(|&[weight, spread]| {
         let row: Vec<f64> = (-radius..=radius)
             .map(|x| (-std::f64::consts::PI.powi(2) * (x as f64 / PIXELS_PER_DEGREE).powi(2) / spread).exp())
@@ -103,7 +106,7 @@ fn blurred(opponents: &[[f64; 3]], channel: usize, width: usize) -> Vec<f64> {
     blurred
 }
 
-/// §4.2: how much of an edge and of a point each pixel is.
+/// §4.2: strengths of edges and points at each pixel.
 fn features(lightness: &[f64], width: usize) -> Vec<[f64; 2]> {
     let deviation = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * deviation).ceil() as isize;
@@ -115,7 +118,7 @@ fn features(lightness: &[f64], width: usize) -> Vec<[f64; 2]> {
     let edge: Vec<f64> = places().map(|x| -x * gauss(x)).collect();
     let point: Vec<f64> = places().map(|x| (x * x / (deviation * deviation) - 1.0) * gauss(x)).collect();
     let [edge, point] = [edge, point].map(|row| {
-        // What is above 0 sums up to 1, what is below to -1.
+        // The positive values sum to 1, the negative ones to -1.
         let above: f64 = row.iter().filter(|value| **value > 0.0).sum();
         let below: f64 = -row.iter().filter(|value| **value < 0.0).sum::<f64>();
         row.into_iter().map(|value| if value > 0.0 { value / above } else { value / below }).collect::<Vec<_>>()
@@ -127,7 +130,7 @@ fn features(lightness: &[f64], width: usize) -> Vec<[f64; 2]> {
     strength(&edge).into_iter().zip(strength(&point)).map(|(edge, point)| [edge, point]).collect()
 }
 
-/// `values` weighted by `across` along rows and by `down` along columns; beyond the border they stay as they are on it.
+/// `values` convolved with `across` along rows and with `down` along columns. Values at the border continue beyond it.
 fn convolved(values: &[f64], width: usize, across: &[f64], down: &[f64]) -> Vec<f64> {
     let height = values.len() / width;
     let mut rows = vec![0.0; values.len()];
@@ -165,7 +168,7 @@ fn to_rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Luminance, red to green, blue to yellow.
+/// Opponent colours: luminance, red to green, blue to yellow.
 fn opponent(xyz: [f64; 3]) -> [f64; 3] {
     let [x, y, z] = [0, 1, 2].map(|i| xyz[i] / WHITE[i]);
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
@@ -176,7 +179,7 @@ fn from_opponent([l, a, b]: [f64; 3]) -> [f64; 3] {
     [(y + a / 500.0) * WHITE[0], y * WHITE[1], (y - b / 200.0) * WHITE[2]]
 }
 
-/// CIE L*a*b*.
+/// CIE L*a*b* of XYZ.
 fn lab(xyz: [f64; 3]) -> [f64; 3] {
     let delta: f64 = 6.0 / 29.0;
     let f = |t: f64| if t > delta.powi(3) { t.cbrt() } else { t / (3.0 * delta * delta) + 4.0 / 29.0 };
@@ -184,7 +187,7 @@ fn lab(xyz: [f64; 3]) -> [f64; 3] {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// Colours of dark things differ less: the Hunt effect.
+/// Hunt effect: dark colours appear less saturated.
 fn hunt([l, a, b]: [f64; 3]) -> [f64; 3] {
     [l, 0.01 * l * a, 0.01 * l * b]
 }
@@ -210,18 +213,18 @@ mod tests {
     #[test]
     fn equal_pictures_do_not_differ() {
         let waves = gray(|x, y| 0.5 + 0.4 * (x as f64 * 0.3).sin() * (y as f64 * 0.2).cos());
-        assert!(mean(&waves, &waves) < 1e-9, "nothing differs");
+        assert!(mean(&waves, &waves) < 1e-9, "equal pictures have no error");
     }
 
     #[test]
     fn black_and_white_differ_as_published() {
         let [black, white] = [gray(|_, _| 0.0), gray(|_, _| 1.0)];
         let error = mean(&black, &white);
-        assert!((error - 0.967).abs() < 0.001, "the authors' program says 0.967, not {error}");
-        // Saturated colours are farthest apart.
+        assert!((error - 0.967).abs() < 0.001, "the authors' program gives 0.967, not {error}");
+        // Saturated colours differ most.
         let [green, blue] = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|color| vec![color; 64 * 48]);
         let error = mean(&green, &blue);
-        assert!((error - 1.0).abs() < 1e-6, "green and blue are what errors are measured by: {error}");
+        assert!((error - 1.0).abs() < 1e-6, "the error of green and blue is 1: {error}");
     }
 
     #[test]
@@ -232,6 +235,6 @@ mod tests {
         };
         let errors = [0.0, 0.02, 0.05, 0.1, 0.3].map(|strength| mean(&noisy(strength), &truth));
         assert!(errors.is_sorted() && errors[1] > 0.0 && errors[4] > 0.1, "{errors:?}");
-        assert!((errors[2] - 0.031_780_323).abs() < 1e-8, "changes of the formula show here: {}", errors[2]);
+        assert!((errors[2] - 0.031_780_323).abs() < 1e-8, "the formula changed: {}", errors[2]);
     }
 }

@@ -1,40 +1,40 @@
-//! How steady pictures are while the camera moves.
+//! The changes of pictures while the camera moves.
 //!
-//! A surface point seen in two pictures after one another should look the same in both, but for what the light, which goes
-//! with the camera, truly changes. The true surface says which pixels show the same point.
+//! A surface point should look the same in successive pictures, apart from true changes: the light moves with the
+//! camera. The true surface says which pixels show the same point.
 
 use crate::exact::Exact;
 use crate::light::{Lit, to_linear};
 use crate::measure::Mean;
 use crate::picture::Picture;
 
-/// Steps in a movement.
+/// Number of measured steps of a movement.
 pub const STEPS: usize = 6;
-/// Pictures of the same movement before them, so that what is averaged over pictures has enough of them: what is measured is the
-/// flicker that stays.
+/// Number of pictures of the same movement before the measured ones. They fill the averages over pictures, so that only
+/// lasting flicker is measured.
 pub const LEAD_IN: usize = 8;
-/// Degrees around the subject for each step.
+/// Angle of each step around the subject, degrees.
 pub const STEP_DEGREES: f64 = 0.7;
-/// Pixels in depth within which two pictures show the same place.
+/// Greatest difference in depth at which two pictures show the same point, pixels.
 const SAME_PX: f64 = 3.0;
 
-/// Mean changes of one surface point from a picture to the next.
+/// Mean changes of a surface point from one picture to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
-    /// Of the normal, degrees.
+    /// Change of the normal, degrees.
     pub degrees: f64,
-    /// Of the lightness shown, in 255ths.
+    /// Change of the lightness, in 255ths.
     pub lightness: f64,
 }
 
-/// Sums up changes over the steps of a movement.
+/// Running means of changes over the steps of a movement.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Changes {
     degrees: Mean,
     lightness: Mean,
 }
 
-/// The pixels of two pictures that show the same surface point.
+/// Pairs of pixels in two pictures that show the same surface point.
 pub fn same(from: &Exact, to: &Exact) -> Vec<(usize, usize)> {
     let [width, height] = [from.width, from.height()];
     let pair = |pixel: usize| {
@@ -53,7 +53,7 @@ pub fn same(from: &Exact, to: &Exact) -> Vec<(usize, usize)> {
 }
 
 impl Changes {
-    /// Takes the step from one picture to the next; `same` are the pixels that show the same.
+    /// Adds the step from one picture to the next. `same` are the pairs of pixels that show the same point.
     pub fn add(&mut self, same: &[(usize, usize)], [before, after]: [(&Picture, &Lit); 2]) {
         for &(from, to) in same {
             if let (Some(one), Some(other)) = (before.0.shown[from], after.0.shown[to])
@@ -67,13 +67,13 @@ impl Changes {
         }
     }
 
-    /// The means; degrees are no number for a method that knows no normals.
+    /// The mean changes. That of normals is NaN for methods without normals.
     pub fn mean(&self) -> Change {
         Change { degrees: self.degrees.value(), lightness: self.lightness.value() }
     }
 }
 
-/// Grey value of an sRGB colour, 0 to 255.
+/// Lightness of an sRGB colour, 0 to 255.
 fn lightness(srgb: [f64; 3]) -> f64 {
     let [r, g, b] = srgb.map(to_linear);
     255.0 * crate::light::to_srgb((0.2126 * r + 0.7152 * g + 0.0722 * b).clamp(0.0, 1.0))

@@ -1,4 +1,4 @@
-//! Exact nearest neighbours in a whole cloud, and plane fits to them in `f64`.
+//! Exact nearest neighbours in a whole cloud, and plane fits in `f64`.
 
 use std::num::NonZero;
 
@@ -6,7 +6,7 @@ use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::{DMat3, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
-/// A cloud that can be asked for the nearest neighbours of any place.
+/// A cloud in a tree for searches of nearest neighbours.
 #[derive(Debug)]
 pub struct Neighbors {
     tree: ImmutableKdTree<f64, 3>,
@@ -16,29 +16,29 @@ pub struct Neighbors {
 }
 
 impl Neighbors {
-    /// Makes `cloud` ready to be asked for `k` neighbours. Its points have to be finite.
+    /// Builds the tree of `cloud`, for searches of `k` neighbours. All points must be finite.
     pub fn new(cloud: &PointCloud, k: NonZero<usize>) -> Self {
         let points: Vec<_> = cloud.positions().iter().map(|point| point.map(f64::from)).collect();
         let tree = ImmutableKdTree::new_from_slice(&points).expect("a tree of finite points");
         Self { tree, points, origin: cloud.origin(), k }
     }
 
-    /// Points in the cloud.
+    /// Number of points in the cloud.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Whether there are none.
+    /// Whether the cloud has no points.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Where point `index` is in the world.
+    /// Position of point `index` in the world.
     pub fn position(&self, index: u32) -> DVec3 {
         self.origin + DVec3::from(self.points[index as usize])
     }
 
-    /// Offsets of the k nearest points from a place in the world, the nearest first.
+    /// Offsets of the k nearest points from a place in the world, in ascending order of length.
     pub fn around(&self, place: DVec3) -> Vec<DVec3> {
         self.offsets(place - self.origin, self.k)
     }
@@ -48,15 +48,15 @@ impl Neighbors {
         nearest.iter().map(|point| DVec3::from(self.points[point.item as usize]) - place).collect()
     }
 
-    /// Normal of the plane through point `index` and its k nearest neighbours, of either sign.
+    /// Normal of the plane fitted to point `index` and its k nearest neighbours, of either sign.
     pub fn normal(&self, index: u32) -> DVec3 {
         self.normals(index, &[self.k.get()])[0]
     }
 
-    /// The same for each of some numbers of neighbours, ascending.
+    /// Normals of planes fitted to these numbers of neighbours, in ascending order.
     pub fn normals(&self, index: u32, numbers: &[usize]) -> Vec<DVec3> {
         let most = numbers.last().copied().unwrap_or_default();
-        // The point itself is among those found.
+        // The point itself is among the points found.
         let offsets = self.offsets(self.points[index as usize].into(), NonZero::<usize>::MIN.saturating_add(most));
         let mut moments = Moments::default();
         let mut normals = Vec::with_capacity(numbers.len());
@@ -66,13 +66,13 @@ impl Neighbors {
                 normals.push(moments.normal());
             }
         }
-        // Fewer points than neighbours asked for: all of them are the neighbourhood.
+        // A cloud with fewer points is one neighbourhood.
         normals.resize(numbers.len(), moments.normal());
         normals
     }
 }
 
-/// Sums over offsets from a place near them.
+/// Sums over offsets from a place near the points.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
     count: f64,
@@ -90,10 +90,10 @@ impl Moments {
         self.mixed += DVec3::new(d.y * d.z, d.z * d.x, d.x * d.y);
     }
 
-    /// Direction in which the offsets spread the least: the eigenvector of the least eigenvalue of their covariance.
+    /// Direction of the least spread: the eigenvector of the least eigenvalue of the offsets' covariance.
     ///
-    /// The eigenvalue is a root of the characteristic polynomial in closed form, its vector is orthogonal to the rows of
-    /// the matrix less that value.
+    /// The eigenvalue is a root of the characteristic polynomial in closed form. The eigenvector is orthogonal to the
+    /// rows of the covariance less the eigenvalue times the identity.
     fn normal(&self) -> DVec3 {
         let mean = self.sum / self.count;
         let squares = self.squares - self.sum * mean;
@@ -129,7 +129,7 @@ mod tests {
         let [a, b] = [normal.any_orthonormal_vector(), normal.cross(normal.any_orthonormal_vector())];
         let grid = (0..25).map(|i| [f64::from(i % 5), f64::from(i / 5)]);
         let mut moments = Moments::default();
-        // Every other point is as far above the plane as the others are below.
+        // Points lie alternately above and below the plane, at the same distance.
         grid.for_each(|[x, y]| moments.add(a * x + b * y + normal * (0.1 * ((x + y) % 2.0 - 0.5))));
         let found = moments.normal();
         assert!((1.0 - found.dot(normal).abs()) < 1e-12, "{found} is not {normal}");
@@ -137,13 +137,13 @@ mod tests {
 
     #[test]
     fn each_number_of_neighbors_has_its_own_plane() {
-        // A small plane square to z, and points far off that tilt it.
+        // A small plane at right angles to z, and distant points that tilt the fit.
         let near = (0..25).map(|i| [(i % 5) as f32 * 0.1, (i / 5) as f32 * 0.1, 0.0]);
         let far = (0..25).map(|i| [10.0 + (i % 5) as f32, (i / 5) as f32, 5.0]);
         let cloud = PointCloud::new(DVec3::ZERO, near.chain(far).collect());
         let neighbors = Neighbors::new(&cloud, NonZero::new(8).expect("8"));
         let normals = neighbors.normals(12, &[8, 40]);
         assert!(normals[0].z.abs() > 1.0 - 1e-9 && normals[1].z.abs() < 0.99, "{normals:?}");
-        assert_eq!(neighbors.normal(12), normals[0], "one number of several");
+        assert_eq!(neighbors.normal(12), normals[0], "one number gives the same as several");
     }
 }

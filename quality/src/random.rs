@@ -1,4 +1,4 @@
-//! Counter-based randomness: the same numbers for the same counter, whichever thread asks.
+//! Counter-based random numbers: a counter gives the same numbers on every thread.
 
 use autosplats::cloud::glam::DVec3;
 
@@ -7,7 +7,7 @@ use autosplats::cloud::glam::DVec3;
 pub struct Random(u64);
 
 impl Random {
-    /// Stream number `counter` of a seed.
+    /// The stream number `counter` of a seed.
     pub fn new(seed: u64, counter: usize) -> Self {
         let mut start = Self((counter as u64) ^ seed.wrapping_mul(0xD6E8_FEB8_6659_FD93));
         Self(start.bits())
@@ -21,18 +21,18 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in 0..1.
+    /// A uniform number, at least 0 and below 1.
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
     }
 
-    /// Normal distribution, mean 0 and standard deviation 1.
+    /// A normally distributed number of mean 0 and standard deviation 1.
     pub fn gauss(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.unit()).cos()
     }
 
-    /// Three independent [`gauss`](Self::gauss).
+    /// Three independent numbers of [`gauss`](Self::gauss).
     pub fn gauss3(&mut self) -> DVec3 {
         DVec3::from([(); 3].map(|()| self.gauss()))
     }

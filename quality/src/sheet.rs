@@ -1,4 +1,4 @@
-//! Contact sheets: what the methods make of a subject, side by side.
+//! Contact sheets: the methods' pictures of a subject, side by side.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -17,32 +17,38 @@ use crate::run::Pictures;
 use crate::subject::Subject;
 use crate::verdict::{Verdict, Verdicts};
 
-/// Widest and highest that a picture on a sheet is.
+/// Greatest width and height of a picture on a sheet, pixels.
 const MOST_SIZE: [usize; 2] = [260, 210];
-/// Narrowest that a column is: its title has to fit.
+/// Least width of a column, pixels. The titles fit into it.
 const LEAST_WIDTH: usize = 110;
-/// What is left around a subject, as a share of its height and width.
+/// Margin around a subject, as a share of its width and height.
 const MARGIN: f64 = 0.06;
-/// Pixels between pictures, and for a line of words above them.
+/// Space between pictures, pixels.
 const GAP: usize = 4;
+/// Height of a line of text, pixels.
 const LINE: usize = 14;
-/// Error of normals that is shown at full strength, degrees.
+/// Error of normals at the end of the colour scale, degrees.
 const MOST_DEGREES: f64 = 30.0;
+/// Colour of the sheet.
 const PAPER_COLOR: [u8; 3] = [250, 250, 250];
+/// Colour of text.
 const INK: [u8; 3] = [40, 40, 40];
-/// Where nothing is in either picture, in the truth alone, in ours alone.
+/// Colour of pixels that are empty in both pictures or not measured.
 const NOTHING: [u8; 3] = [205, 210, 215];
+/// Colour of pixels that only the true picture covers.
 const MISSING: [u8; 3] = [0, 170, 60];
+/// Colour of pixels that only our picture covers.
 const EXTRA: [u8; 3] = [60, 130, 255];
 
-/// Columns of a sheet: the truth, these methods, and the error of ours.
+/// Methods with a column, between those of the truth and of our error.
 const METHODS: [Method; 3] = [Method::Dots, Method::Paper, Method::Ours];
+/// Titles of the columns.
 const TITLES: [&str; 5] = ["truth", "dots", "paper", "ours", "error of ours"];
 
 /// One row of a sheet: five small pictures.
 #[derive(Debug)]
 pub struct Row {
-    /// What the sheet is of.
+    /// Name of the sheet: the surface's.
     sheet: &'static str,
     title: String,
     pictures: Vec<Small>,
@@ -55,8 +61,9 @@ struct Small {
     pixels: Vec<[u8; 3]>,
 }
 
-/// The colour of a verdict: normals right in black to 30° wrong in white, holes red, other missing pixels orange, pixels too
-/// many blue, leaks magenta, surface before the true one cyan, beside it yellow, unsampled brown.
+/// The colour of a verdict. Right pixels are black to white, by an error of the normal of 0° to 30°. Holes are red,
+/// other missing pixels orange, pixels outside blue, leaks magenta, surfaces in front cyan, beside yellow, unsampled
+/// brown.
 pub fn verdict_color(verdict: Verdict, degrees: Option<f64>) -> [u8; 3] {
     match verdict {
         Verdict::Empty => [0, 60, 40],
@@ -71,7 +78,7 @@ pub fn verdict_color(verdict: Verdict, degrees: Option<f64>) -> [u8; 3] {
     }
 }
 
-/// The colour of an error of normals: blue-black over red and orange to white at 30° and above.
+/// The colour of an error of normals: from blue-black over red and orange to white at 30° and above.
 pub fn error_color(degrees: f64) -> [u8; 3] {
     const STOPS: [[f64; 3]; 5] =
         [[10.0, 10.0, 40.0], [70.0, 20.0, 110.0], [190.0, 50.0, 70.0], [250.0, 150.0, 30.0], [255.0, 255.0, 230.0]];
@@ -81,7 +88,7 @@ pub fn error_color(degrees: f64) -> [u8; 3] {
 }
 
 impl Row {
-    /// A row for the pictures of a case, cut to where the subject is.
+    /// A row of the pictures of a case, cropped to the subject.
     pub fn new(case: &Case, pictures: &Pictures) -> Self {
         let exact = &pictures.truth.exact;
         let part = Part::around(&pictures.truth.lit);
@@ -107,17 +114,17 @@ impl Row {
     }
 }
 
-/// A part of a picture.
+/// A rectangle of a picture.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     low: [usize; 2],
     size: [usize; 2],
-    /// Pixels of it for one on the sheet.
+    /// Pixels of the picture per pixel of the sheet, along a side.
     scale: f64,
 }
 
 impl Part {
-    /// The part that is covered, and a margin.
+    /// The covered part, with a margin.
     fn around(lit: &Lit) -> Self {
         let sides = [lit.width, lit.pixels.len() / lit.width];
         let mut low = sides;
@@ -134,7 +141,7 @@ impl Part {
         Self { low, size, scale: scale[0].max(scale[1]) }
     }
 
-    /// This part of a picture of rows of `width` pixels, each pixel a mean of those it stands for.
+    /// The rectangle at the sheet's scale: each pixel is a mean. `width` is that of the whole picture.
     fn small(&self, width: usize, color: impl Fn(usize) -> [f64; 3]) -> Small {
         let [columns, rows] = self.size.map(|side| ((side as f64 / self.scale) as usize).max(1));
         let range = |at: usize, i: usize| {
@@ -153,10 +160,10 @@ impl Part {
     }
 }
 
-/// Writes a sheet for each surface into `folder` and returns their names.
+/// Writes a sheet for each surface into `folder`, and returns the sheets' names.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// A file cannot be written.
 pub fn write_all(folder: &Path, rows: &[Row]) -> Result<Vec<String>> {
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let mut names: Vec<&str> = Vec::new();
@@ -172,10 +179,11 @@ pub fn write_all(folder: &Path, rows: &[Row]) -> Result<Vec<String>> {
     Ok(names.into_iter().map(str::to_owned).collect())
 }
 
-/// Writes the pictures of a case into `folder`, each whole: the truth and each method's, lit, and the verdict on ours.
+/// Writes the full-size pictures of a case into `folder`: the lit truth, each method's lit picture, and verdicts on
+/// ours.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// A file cannot be written.
 pub fn write_full_size(folder: &Path, case: &Case, subject: &Subject, pictures: &Pictures) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let exact = &pictures.truth.exact;
@@ -199,11 +207,11 @@ pub fn write_full_size(folder: &Path, case: &Case, subject: &Subject, pictures: 
     Ok(())
 }
 
-/// Writes rows below each other, with a title for each column and a legend.
+/// Writes a sheet of these rows, with titles of the columns and a legend.
 fn write(path: &Path, rows: &[&Row]) -> Result<()> {
     let height = |row: &Row| row.pictures.first().map_or(0, |small| small.pixels.len() / small.width);
     let widest = rows.iter().flat_map(|row| &row.pictures).map(|small| small.width).max();
-    let column = widest.context("a sheet without pictures")?.max(LEAST_WIDTH) + GAP;
+    let column = widest.context("the sheet has no pictures")?.max(LEAST_WIDTH) + GAP;
     let width = TITLES.len() * column + GAP;
     let total = 2 * LINE + rows.iter().map(|row| height(row) + LINE + GAP).sum::<usize>();
     let mut image = RgbImage::from_pixel(width as u32, total as u32, Rgb(PAPER_COLOR));
@@ -241,7 +249,7 @@ fn legend(image: &mut RgbImage, x: usize, y: usize) {
     }
 }
 
-/// Writes ASCII.
+/// Draws ASCII text.
 fn say(image: &mut RgbImage, x: usize, y: usize, text: &str) {
     for (column, glyph) in text.bytes().map(|byte| BASIC_LEGACY[usize::from(byte) % 128]).enumerate() {
         for (row, bits) in glyph.into_iter().enumerate() {

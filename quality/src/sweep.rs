@@ -1,10 +1,10 @@
-//! Points as a spinning lidar sees them: dense along rings, far apart from ring to ring.
+//! The points of a spinning lidar: dense along rings, far apart between rings.
 //!
 //! # How it works
-//! The sensor turns about the vertical and sends its beams at constant steps of elevation, all of them at each of the
-//! constant steps of a turn. A ray that meets the surface leaves a point there. From the same steps follows, without
-//! asking for neighbours, how far apart points are at a place: where rings lie far apart the nearest neighbours are all
-//! on one of them, and would tell how close points are along it.
+//! The sensor turns about the vertical in constant steps. At each step it sends all its beams, at constant steps of
+//! elevation. A ray that hits the surface makes a point there. The spacing of points at a place follows from these
+//! steps. Neighbour searches would give a wrong spacing: the nearest neighbours of a point are often all on its own
+//! ring.
 
 use std::f64::consts::TAU;
 
@@ -13,23 +13,23 @@ use rayon::prelude::*;
 
 use crate::surface::Surface;
 
-/// Cosine of the flattest incidence, 87°, at which a place counts as seen.
+/// Least cosine of the angle of incidence at which the sensor sees a place: that of 87°.
 const FLATTEST: f64 = 0.0523;
-/// Share of the way to a place at which something else is in the way.
+/// Greatest difference of two distances from the sensor to one place, as a share of the distance.
 const BEFORE: f64 = 1e-3;
 
-/// A spinning lidar and where it stands. Lengths are in metres, as scenes are, angles in degrees; z is up.
+/// A spinning lidar and its place. Lengths are in metres, as in scenes, angles in degrees. The z axis points up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
-    /// Where the sensor is.
+    /// Position of the sensor.
     pub eye: [f64; 3],
-    /// Elevation of the lowest and of the highest beam.
+    /// Elevations of the lowest and the highest beam, degrees.
     pub elevations: [f64; 2],
-    /// Beams, at least two.
+    /// Number of beams, at least 2.
     pub beams: usize,
-    /// Steps in a turn.
+    /// Number of steps in a turn.
     pub azimuths: usize,
-    /// Standard deviation of noise along the ray.
+    /// Standard deviation of noise along the ray, metres.
     pub noise: f64,
 }
 
@@ -39,38 +39,38 @@ impl Sweep {
         Self { eye, elevations, beams, azimuths, noise: 0.0 }
     }
 
-    /// The same with noise.
+    /// The same sensor with noise of this standard deviation in metres.
     pub const fn noise(self, noise: f64) -> Self {
         Self { noise, ..self }
     }
 
-    /// Rays in a turn.
+    /// Number of rays in a turn.
     pub const fn count(&self) -> usize {
         self.beams * self.azimuths
     }
 
-    /// Where the sensor is.
+    /// Position of the sensor.
     pub fn origin(&self) -> DVec3 {
         DVec3::from(self.eye)
     }
 
-    /// Radians from one beam to the next, and from one step of the turn to the next.
+    /// Radians between beams, and between steps of the turn.
     fn steps(&self) -> [f64; 2] {
         let [low, high] = self.elevations;
         [(high - low).to_radians() / (self.beams - 1) as f64, TAU / self.azimuths as f64]
     }
 
-    /// Unit direction of a ray: the beams of one step of the turn follow each other, the lowest first.
+    /// Unit direction of a ray. Rays are ordered by step of the turn, then by beam from the lowest up.
     fn direction(&self, ray: usize) -> DVec3 {
         let [up, around] = self.steps();
         let (beam, azimuth) = (ray % self.beams, ray / self.beams);
         let (sin, cos) = (self.elevations[0].to_radians() + up * beam as f64).sin_cos();
-        // Half a step off the axes, which run along walls.
+        // The half step keeps rays off the axes, along which walls run.
         let (y, x) = (around * (azimuth as f64 + 0.5)).sin_cos();
         DVec3::new(cos * x, cos * y, sin)
     }
 
-    /// Where the rays meet the surface, in their order.
+    /// The intersections of the rays with the surface, in the order of the rays.
     pub fn points(&self, surface: &Surface) -> Vec<DVec3> {
         let origin = self.origin();
         let meet = |ray: usize| {
@@ -80,8 +80,8 @@ impl Sweep {
         (0..self.count()).into_par_iter().filter_map(meet).collect()
     }
 
-    /// Distance on the surface at `place` between points that are next to each other, along the ring or across, whichever
-    /// is the longer; infinite where the sensor sees nothing of it.
+    /// Distance on the surface between neighbouring points at `place`: along the ring or across rings, whichever is
+    /// longer. Infinite where the sensor does not see the surface.
     pub fn gap(&self, surface: &Surface, place: DVec3) -> f64 {
         let offset = place - self.origin();
         let (range, direction) = (offset.length(), offset.normalize());
@@ -97,7 +97,7 @@ impl Sweep {
         }
         let [up, around] = self.steps();
         let aside = DVec3::Z.cross(direction);
-        // A ray turned by a small angle leaves the point it met by as much, and then goes on to the tangent plane.
+        // A small turn shifts the ray's end by range times angle. From there the ray goes on to the tangent plane.
         let gap = |turned: DVec3| range * (turned - direction * (turned.dot(hit.normal) / cos)).length();
         gap(aside * around).max(gap(direction.cross(aside).normalize_or(DVec3::X) * up))
     }

@@ -1,13 +1,13 @@
-//! Tables in Markdown, and numbers in them.
+//! Tables in Markdown, and numbers as their cells.
 
-/// A table in the making.
+/// A table that grows row by row.
 #[derive(Debug)]
 pub struct Table {
     text: String,
 }
 
 impl Table {
-    /// A table with these columns: the first of words, the others of numbers.
+    /// A table with these columns. The first is aligned left, like words, the others right, like numbers.
     pub fn new(columns: &[&str]) -> Self {
         let rule = "|---".to_owned() + &"|--:".repeat(columns.len() - 1);
         Self { text: format!("| {} |\n{rule}|\n", columns.join(" | ")) }
@@ -18,16 +18,16 @@ impl Table {
         self.text += &format!("| {} |\n", cells.join(" | "));
     }
 
-    /// The table, with an empty line after it.
+    /// The table as text, followed by an empty line.
     pub fn finish(self) -> String {
         self.text + "\n"
     }
 }
 
-/// A number with so many decimals; a dash for what is none.
+/// A number with this many decimals, or a dash if it is not finite.
 pub fn number(value: f64, decimals: usize) -> String {
     let text = if value.is_finite() { format!("{value:.decimals$}") } else { return "–".into() };
-    // What rounds to nothing has no sign.
+    // Values that round to zero have no sign.
     let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
     if is_zero { text.trim_start_matches('-').into() } else { text }
 }

@@ -1,4 +1,4 @@
-//! Pictures against the exact surface, in one program of tests: each further one is linked for itself.
+//! Pictures against the exact surface, in one program of tests, because every further program is linked by itself.
 
 mod light;
 mod limits;
