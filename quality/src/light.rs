@@ -129,6 +129,6 @@ mod tests {
         // Half the light is 188 of 255 in sRGB.
         let [mean, rest] = [small.pixels[0].expect("covered"), small.around[1]].map(|color| (color[0] * 255.0).round());
         assert_eq!([small.width, small.pixels.len()], [2, 2], "size");
-        assert_eq!(([mean, rest], small.pixels[1]), ([188.0, 0.0], None), "means, and what is not covered");
+        assert_eq!(([mean, rest], small.pixels[1]), ([188.0, 0.0], None), "the mean colour, and an empty pixel");
     }
 }

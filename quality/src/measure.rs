@@ -36,8 +36,8 @@ pub struct Angles {
 pub struct Swept {
     /// Share of the true surface that the lidar sees.
     pub seen: f64,
-    /// Share of the seen surface that is covered, at any depth. 1 is out of reach: no point says where a surface ends past
-    /// its last ring.
+    /// Share of the seen surface that is covered, at any depth. 1 is out of reach: no point says where a surface ends
+    /// past its last ring.
     pub closed: f64,
     /// Share of the seen surface that is covered at the true depth, within a tolerance of the spacing of rings.
     pub right: f64,
