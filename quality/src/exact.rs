@@ -5,27 +5,27 @@ use autosplats::Camera;
 use autosplats::cloud::glam::DVec3;
 use rayon::prelude::*;
 
-use crate::picture::{Picture, Shown};
+use crate::picture::{DrawnSurface, Picture};
 use crate::rays::Rays;
 use crate::subject::Subject;
 
 /// Greatest spacing of points that counts as sampled, pixels.
-const WIDEST_SPACING_PX: f64 = 1.5;
+const MAX_SPACING_PX: f64 = 1.5;
 /// Fewest of a place's nearest points within 30° of its tangent plane that make the place count as sampled. Points
 /// beyond an edge do not sample this side of the edge, which a scanner may not have seen.
-const LEAST_BESIDE: usize = 3;
+const MIN_POINTS_NEAR_PLANE: usize = 3;
 /// Least cosine between line of sight and normal from which the tolerance in depth is computed.
-const STEEPEST: f64 = 0.1;
+const MIN_TOLERANCE_COSINE: f64 = 0.1;
 /// Tolerance in depth where the lidar does not see the surface, as a share of the subject's diagonal.
-const UNSEEN: f64 = 0.01;
+const UNSEEN_TOLERANCE: f64 = 0.01;
 /// Greatest distance from a silhouette, in pixels, at which a pixel belongs to the band.
 const BAND_PX: usize = 4;
 /// Least step in depth that may be a silhouette, pixels.
-const LEAST_STEP_PX: f64 = 4.0;
+const MIN_STEP_PX: f64 = 4.0;
 
 /// The true surface at a pixel's centre.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct TrueSurface {
     /// Depth along the viewing axis.
     pub depth: f64,
     /// Unit normal in world space, towards the eye.
@@ -39,7 +39,7 @@ pub struct Seen {
     pub sampled: bool,
     /// Greatest difference in depth that counts as the same surface, a sum of three terms. The first is the distance to
     /// the k-th nearest point, or a lidar's spacing. The others are a slanted surface's depth within a pixel, and
-    /// [`Subject::blur`].
+    /// [`Subject::max_offset`].
     pub tolerance: f64,
 }
 
@@ -51,7 +51,7 @@ pub struct Exact {
     /// The picture's lines of sight.
     pub rays: Rays,
     /// The surface at each pixel's centre. `None` where no surface is.
-    pub seen: Vec<Option<Seen>>,
+    pub seen: Vec<Option<TrueSurface>>,
 }
 
 impl Exact {
@@ -64,22 +64,22 @@ impl Exact {
             let (spacing, reach, all_around) = match &subject.recipe.sweep {
                 Some(sweep) => {
                     let gap = sweep.gap(&subject.surface, place);
-                    (gap, if gap.is_finite() { gap } else { UNSEEN * subject.diagonal }, true)
+                    (gap, if gap.is_finite() { gap } else { UNSEEN_TOLERANCE * subject.diagonal }, true)
                 }
                 None => {
                     let around = subject.clean.around(place);
                     let beside = around.iter().filter(|offset| offset.dot(seen.normal).abs() <= 0.5 * offset.length());
-                    (spacing(&around), reach(&around), beside.count() >= LEAST_BESIDE)
+                    (spacing(&around), reach(&around), beside.count() >= MIN_POINTS_NEAR_PLANE)
                 }
             };
             let spacing_px = spacing / pixel_size;
-            let cos = direction.dot(seen.normal).abs().clamp(STEEPEST, 1.0);
+            let cos = direction.dot(seen.normal).abs().clamp(MIN_TOLERANCE_COSINE, 1.0);
             let slant = pixel_size * (1.0 - cos * cos).sqrt() / cos;
-            Seen {
+            TrueSurface {
                 spacing_px,
                 swept: subject.recipe.sweep.map(|_| spacing.is_finite()),
-                sampled: spacing_px <= WIDEST_SPACING_PX && all_around,
-                tolerance: reach + slant + subject.blur,
+                sampled: spacing_px <= MAX_SPACING_PX && all_around,
+                tolerance: reach + slant + subject.max_offset,
                 ..seen
             }
         })
@@ -89,7 +89,7 @@ impl Exact {
     ///
     /// # Errors
     /// An invalid camera.
-    pub fn trace_alone(subject: &Subject, camera: &Camera, size: [u32; 2]) -> Result<Self> {
+    pub fn trace_surface(subject: &Subject, camera: &Camera, size: [u32; 2]) -> Result<Self> {
         Self::trace_with(subject, camera, size, |seen, _, _, _| seen)
     }
 
@@ -99,7 +99,7 @@ impl Exact {
         subject: &Subject,
         camera: &Camera,
         size @ [width, height]: [u32; 2],
-        about: impl Fn(Seen, DVec3, DVec3, f64) -> Seen + Sync,
+        about: impl Fn(TrueSurface, DVec3, DVec3, f64) -> TrueSurface + Sync,
     ) -> Result<Self> {
         let rays = Rays::new(camera, size)?;
         let trace = |index: u32| {
@@ -107,7 +107,8 @@ impl Exact {
             let hit = subject.surface.trace(origin, direction)?;
             let depth = hit.distance * direction.dot(rays.axes[2]);
             let normal = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };
-            let seen = Seen { depth, normal, spacing_px: f64::INFINITY, swept: None, sampled: false, tolerance: 0.0 };
+            let seen =
+                TrueSurface { depth, normal, spacing_px: f64::INFINITY, swept: None, sampled: false, tolerance: 0.0 };
             Some(about(seen, origin + direction * hit.distance, direction, rays.pixel_size(depth)))
         };
         let seen = (0..width * height).into_par_iter().map(trace).collect();
@@ -120,12 +121,12 @@ impl Exact {
     }
 
     /// Whether a pixel is measured. Pixels of a surface that the lidar does not see are not.
-    pub fn is_asked(&self, pixel: usize) -> bool {
+    pub fn is_measured(&self, pixel: usize) -> bool {
         self.seen[pixel].is_none_or(|seen| seen.swept != Some(false))
     }
 
     /// Whether a drawn point lies where points are dense enough. Outliers count as such: they should not be visible.
-    pub fn is_sampled(&self, shown: &Shown, subject: &Subject) -> bool {
+    pub fn is_sampled(&self, shown: &DrawnSurface, subject: &Subject) -> bool {
         if subject.is_outlier(shown.point) {
             return true;
         }
@@ -134,11 +135,11 @@ impl Exact {
             Some(sweep) => sweep.gap(&subject.surface, place),
             None => spacing(&subject.clean.around(place)),
         };
-        spacing <= WIDEST_SPACING_PX * self.rays.pixel_size(shown.depth)
+        spacing <= MAX_SPACING_PX * self.rays.pixel_size(shown.depth)
     }
 
     /// The true surface at all pixels at most `reach` pixels from `index` in x and in y.
-    pub fn around(&self, index: usize, reach: usize) -> impl Iterator<Item = Option<&Seen>> {
+    pub fn around(&self, index: usize, reach: usize) -> impl Iterator<Item = Option<&TrueSurface>> {
         self.beside(index, reach).map(|pixel| self.seen[pixel].as_ref())
     }
 
@@ -169,24 +170,25 @@ impl Exact {
     }
 
     /// Whether two neighbouring pixels show different surfaces: neither's tangent plane leads to the other.
-    fn is_torn(&self, here: &Seen, there: &Seen, [x, y]: [f64; 2]) -> bool {
+    fn is_torn(&self, here: &TrueSurface, there: &TrueSurface, [x, y]: [f64; 2]) -> bool {
         let jump = there.depth - here.depth;
         let unit = self.rays.pixel_size(here.depth.min(there.depth));
-        let rise = |seen: &Seen| {
+        let rise = |seen: &TrueSurface| {
             let normal = self.rays.turned(seen.normal);
             // Growth of the plane's depth towards the other pixel.
             if normal.z == 0.0 { f64::INFINITY } else { -(normal.x * x + normal.y * y) / normal.z * unit }
         };
-        let is_off = |seen: &Seen| !((jump - rise(seen)).abs() <= 0.5 * jump.abs());
-        jump.abs() > LEAST_STEP_PX * unit && is_off(here) && is_off(there)
+        let is_off = |seen: &TrueSurface| !((jump - rise(seen)).abs() <= 0.5 * jump.abs());
+        jump.abs() > MIN_STEP_PX * unit && is_off(here) && is_off(there)
     }
 }
 
 impl Picture {
     /// The true picture, as a method without errors would draw it.
     pub fn truth(exact: &Exact) -> Self {
-        let show =
-            |seen: &Option<Seen>| seen.map(|seen| Shown { depth: seen.depth, normal: seen.normal, point: u32::MAX });
+        let show = |seen: &Option<TrueSurface>| {
+            seen.map(|seen| DrawnSurface { depth: seen.depth, normal: seen.normal, point: u32::MAX })
+        };
         Self { width: exact.width, shown: exact.seen.iter().map(show).collect() }
     }
 }

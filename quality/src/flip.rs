@@ -11,7 +11,7 @@ const PIXELS_PER_DEGREE: f64 = 67.0;
 /// §4.1: contrast sensitivity of the three opponent channels. Each is a sum of Gaussians of these weights and spreads.
 const SENSITIVITY: [&[[f64; 2]]; 3] = [&[[1.0, 0.0047]], &[[1.0, 0.0053]], &[[34.1, 0.04], [13.5, 0.025]]];
 /// Greatest spread in [`SENSITIVITY`].
-const WIDEST: f64 = 0.04;
+const MAX_SPREAD: f64 = 0.04;
 /// §4.1: exponent of differences in colour.
 const EXPONENT: f64 = 0.7;
 /// §4.1: difference in colour between the two linear parts of the error, as a share of the greatest difference.
@@ -88,7 +88,7 @@ impl Prepared {
 /// §4.1: one opponent channel, blurred by the eye's contrast sensitivity.
 fn blurred(opponents: &[[f64; 3]], channel: usize, width: usize) -> Vec<f64> {
     let values: Vec<f64> = opponents.par_iter().map(|color| color[channel]).collect();
-    let radius = (3.0 * (WIDEST / (2.0 * std::f64::consts::PI.powi(2))).sqrt() * PIXELS_PER_DEGREE).ceil() as isize;
+    let radius = (3.0 * (MAX_SPREAD / (2.0 * std::f64::consts::PI.powi(2))).sqrt() * PIXELS_PER_DEGREE).ceil() as isize;
     // Each Gaussian is separable. Weights make the sum of the whole filter 1.
     let parts = SENSITIVITY[channel].iter().map(|&[weight, spread]| {
         let row: Vec<f64> = (-radius..=radius)

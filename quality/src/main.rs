@@ -226,7 +226,7 @@ fn print(outcome: &Outcome) {
         for (name, change) in truth.into_iter().chain(methods) {
             println!("    in motion, {name:<12} normals {:6.2}, lightness {:6.2}", change.degrees, change.lightness);
         }
-        let [alone, steady] = motion.degrees_off;
+        let [alone, steady] = motion.last_normal_errors;
         println!("    error of normals in the last picture: {alone:.2} alone, {steady:.2} from earlier pictures");
     }
 }

@@ -1,9 +1,9 @@
 //! The measures of one picture.
 
-use crate::exact::{Exact, Seen};
+use crate::exact::{Exact, TrueSurface};
 use crate::flip::Flip;
 use crate::light::{Lit, either, psnr};
-use crate::picture::{Picture, Shown};
+use crate::picture::{DrawnSurface, Picture};
 use crate::subject::Subject;
 use crate::verdict::{Cover, Verdicts};
 
@@ -101,7 +101,7 @@ impl Truth {
 
     /// The measured pixels that the picture or the truth covers.
     fn compared<'a>(&'a self, lit: &'a Lit) -> impl Iterator<Item = usize> + 'a {
-        either(lit, &self.lit).filter(|&pixel| self.exact.is_asked(pixel))
+        either(lit, &self.lit).filter(|&pixel| self.exact.is_measured(pixel))
     }
 
     /// Mean FLIP error over the compared pixels.
@@ -118,7 +118,7 @@ pub fn angle(exact: &Exact, picture: &Picture, pixel: usize) -> Option<f64> {
     between(&exact.seen[pixel]?, &picture.shown[pixel]?)
 }
 
-fn between(seen: &Seen, shown: &Shown) -> Option<f64> {
+fn between(seen: &TrueSurface, shown: &DrawnSurface) -> Option<f64> {
     // The sine is precise at small angles, unlike the cosine.
     let sine = shown.normal.cross(seen.normal).length();
     (shown.normal.length_squared() > 0.0).then(|| sine.atan2(shown.normal.dot(seen.normal)).to_degrees())
@@ -126,12 +126,12 @@ fn between(seen: &Seen, shown: &Shown) -> Option<f64> {
 
 /// Whether the drawn normal is more than 90° off all true normals at the pixel and the eight around it.
 fn is_flipped(exact: &Exact, picture: &Picture, pixel: usize) -> bool {
-    let turned_away = |seen: &Seen| picture.shown[pixel].is_some_and(|shown| between(seen, &shown) > Some(90.0));
+    let turned_away = |seen: &TrueSurface| picture.shown[pixel].is_some_and(|shown| between(seen, &shown) > Some(90.0));
     exact.around(pixel, 1).flatten().all(turned_away)
 }
 
 fn angles(exact: &Exact, band: &[bool], picture: &Picture) -> Option<Angles> {
-    let asked = (0..band.len()).filter(|&pixel| exact.is_asked(pixel));
+    let asked = (0..band.len()).filter(|&pixel| exact.is_measured(pixel));
     let each = asked.filter_map(|pixel| Some((pixel, angle(exact, picture, pixel)?)));
     let mut flipped = 0;
     let mut near = Mean::default();
@@ -164,10 +164,10 @@ fn swept(exact: &Exact, picture: &Picture) -> Option<Swept> {
         || both().filter_map(|(seen, shown)| seen.filter(|seen| seen.swept == Some(true)).map(|seen| (seen, shown)));
     let count = here().count() as f64;
     let closed = here().filter(|(_, shown)| shown.is_some()).count() as f64;
-    let is_right = |seen: &Seen, shown: &Shown| (shown.depth - seen.depth).abs() <= seen.tolerance;
+    let is_right = |seen: &TrueSurface, shown: &DrawnSurface| (shown.depth - seen.depth).abs() <= seen.tolerance;
     let right = here().filter(|(seen, shown)| shown.is_some_and(|shown| is_right(seen, &shown))).count() as f64;
     // Unseen surfaces lie in shadow. Nothing should float in front of them, on the way to what casts the shadow.
-    let is_over = |seen: &Option<Seen>, shown: &Shown| match seen {
+    let is_over = |seen: &Option<TrueSurface>, shown: &DrawnSurface| match seen {
         None => true,
         Some(seen) => seen.swept == Some(false) && shown.depth < seen.depth - seen.tolerance,
     };
@@ -183,7 +183,7 @@ fn swept(exact: &Exact, picture: &Picture) -> Option<Swept> {
 
 fn depth_px(exact: &Exact, picture: &Picture) -> f64 {
     let mut mean = Mean::default();
-    for pixel in (0..exact.seen.len()).filter(|&pixel| exact.is_asked(pixel)) {
+    for pixel in (0..exact.seen.len()).filter(|&pixel| exact.is_measured(pixel)) {
         if let (Some(seen), Some(shown)) = (&exact.seen[pixel], &picture.shown[pixel]) {
             mean.add((shown.depth - seen.depth).abs() / exact.rays.pixel_size(seen.depth));
         }
@@ -221,7 +221,8 @@ mod tests {
 
     /// A true picture of one row of pixels with these normals.
     fn row(normals: [DVec3; 5]) -> Exact {
-        let seen = |normal| Seen { depth: 1.0, normal, spacing_px: 1.0, swept: None, sampled: true, tolerance: 0.1 };
+        let seen =
+            |normal| TrueSurface { depth: 1.0, normal, spacing_px: 1.0, swept: None, sampled: true, tolerance: 0.1 };
         let camera = Camera {
             eye: DVec3::ZERO,
             look_at: DVec3::Z,
@@ -237,7 +238,7 @@ mod tests {
         let exact = row([DVec3::NEG_Z; 5]);
         let turned = |degrees: f64| DVec3::new(degrees.to_radians().sin(), 0.0, -degrees.to_radians().cos());
         let shown =
-            [40.0, 1.0, 6.0, 93.0, 4.0].map(|angle| Some(Shown { depth: 1.0, normal: turned(angle), point: 0 }));
+            [40.0, 1.0, 6.0, 93.0, 4.0].map(|angle| Some(DrawnSurface { depth: 1.0, normal: turned(angle), point: 0 }));
         let band = [true, false, true, false, false];
         let found = angles(&exact, &band, &Picture { width: 5, shown: shown.to_vec() }).expect("normals");
         let Angles { mean, median, rms, below_5, below_10, above_90, flipped, band } = found;
@@ -253,8 +254,8 @@ mod tests {
         let sides = [0.9, 0.9, 0.9, -0.9, -0.9].map(|x| DVec3::new(x, 0.0, -0.44).normalize());
         let exact = row(sides);
         let shares = |wrong: usize| {
-            let mut shown = sides.map(|normal| Some(Shown { depth: 1.0, normal, point: 0 }));
-            shown[wrong] = Some(Shown { depth: 1.0, normal: sides[4], point: 0 });
+            let mut shown = sides.map(|normal| Some(DrawnSurface { depth: 1.0, normal, point: 0 }));
+            shown[wrong] = Some(DrawnSurface { depth: 1.0, normal: sides[4], point: 0 });
             let angles = angles(&exact, &[false; 5], &Picture { width: 5, shown: shown.to_vec() }).expect("normals");
             [angles.above_90, angles.flipped].map(|share| (5.0 * share).round() as usize)
         };

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::light::{BACKGROUND, Lit};
 use crate::neighbors::Neighbors;
-use crate::picture::{Picture, Shown};
+use crate::picture::{DrawnSurface, Picture};
 use crate::rays::Rays;
 use crate::subject::Subject;
 
@@ -244,7 +244,7 @@ fn dots(subject: &Subject, rays: &Rays, [width, height]: [u32; 2]) -> Picture {
     let show = |pixel: &AtomicU64| {
         let key = pixel.load(Relaxed);
         let depth = f64::from(f32::from_bits((key >> 32) as u32));
-        (key != u64::MAX).then_some(Shown { depth, normal: DVec3::ZERO, point: key as u32 })
+        (key != u64::MAX).then_some(DrawnSurface { depth, normal: DVec3::ZERO, point: key as u32 })
     };
     Picture { width: width as usize, shown: pixels.iter().map(show).collect() }
 }

@@ -12,11 +12,11 @@ use crate::picture::Picture;
 pub const STEPS: usize = 6;
 /// Number of pictures of the same movement before the measured ones. They fill the averages over pictures, so that only
 /// lasting flicker is measured.
-pub const LEAD_IN: usize = 8;
+pub const LEAD_IN_STEPS: usize = 8;
 /// Angle of each step around the subject, degrees.
 pub const STEP_DEGREES: f64 = 0.7;
 /// Greatest difference in depth at which two pictures show the same point, pixels.
-const SAME_PX: f64 = 3.0;
+const MAX_DEPTH_DIFFERENCE_PX: f64 = 3.0;
 
 /// Mean changes of a surface point from one picture to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +46,7 @@ pub fn same(from: &Exact, to: &Exact) -> Vec<(usize, usize)> {
             return None;
         }
         let other = y as usize * width + x as usize;
-        let is_same = (to.seen[other]?.depth - depth).abs() < SAME_PX * to.rays.pixel_size(depth);
+        let is_same = (to.seen[other]?.depth - depth).abs() < MAX_DEPTH_DIFFERENCE_PX * to.rays.pixel_size(depth);
         is_same.then_some((pixel, other))
     };
     (0..from.seen.len()).filter_map(pair).collect()

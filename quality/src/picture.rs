@@ -7,7 +7,7 @@ use crate::rays::Rays;
 
 /// The surface that a picture shows at a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shown {
+pub struct DrawnSurface {
     /// Depth along the viewing axis.
     pub depth: f64,
     /// Unit normal in world space, towards the eye. Zero for methods without normals.
@@ -22,7 +22,7 @@ pub struct Picture {
     /// Number of pixels in a row.
     pub width: usize,
     /// The surface at each pixel. `None` where the picture is empty.
-    pub shown: Vec<Option<Shown>>,
+    pub shown: Vec<Option<DrawnSurface>>,
 }
 
 impl Picture {
@@ -33,7 +33,7 @@ impl Picture {
             let index = layers.index(pixel % width, pixel / width);
             let depth = f64::from(layers.depth[index]);
             let normal = (0..3).map(|i| rays.axes[i] * f64::from(layers.normal[index][i])).sum();
-            depth.is_finite().then_some(Shown { depth, normal, point: layers.point[index] })
+            depth.is_finite().then_some(DrawnSurface { depth, normal, point: layers.point[index] })
         };
         Self { width, shown: (0..width * height).map(show).collect() }
     }
@@ -54,16 +54,16 @@ impl Picture {
     /// The picture with the normals of `other` where both show a surface.
     #[must_use]
     pub fn with_normals_of(&self, other: &Self) -> Self {
-        let replace = |(shown, other): (&Option<Shown>, &Option<Shown>)| {
-            shown.map(|shown| Shown { normal: other.map_or(shown.normal, |other| other.normal), ..shown })
+        let replace = |(shown, other): (&Option<DrawnSurface>, &Option<DrawnSurface>)| {
+            shown.map(|shown| DrawnSurface { normal: other.map_or(shown.normal, |other| other.normal), ..shown })
         };
         Self { width: self.width, shown: self.shown.iter().zip(&other.shown).map(replace).collect() }
     }
 
     /// The picture with every covered pixel replaced by the result of `change`, which may be empty.
     #[must_use]
-    pub fn changed(&self, change: impl Fn(usize, Shown) -> Option<Shown>) -> Self {
-        let change = |(pixel, shown): (usize, &Option<Shown>)| shown.and_then(|shown| change(pixel, shown));
+    pub fn changed(&self, change: impl Fn(usize, DrawnSurface) -> Option<DrawnSurface>) -> Self {
+        let change = |(pixel, shown): (usize, &Option<DrawnSurface>)| shown.and_then(|shown| change(pixel, shown));
         Self { width: self.width, shown: self.shown.iter().enumerate().map(change).collect() }
     }
 }

@@ -290,7 +290,7 @@ fn lightness(outcome: &Outcome) -> Vec<(String, f64)> {
 
 fn last_normals(outcome: &Outcome) -> Vec<(String, f64)> {
     let Some(motion) = &outcome.motion else { return Vec::new() };
-    let [alone, steady] = motion.degrees_off;
+    let [alone, steady] = motion.last_normal_errors;
     vec![("alone".to_owned(), alone), (Method::Ours.name(), steady)]
 }
 

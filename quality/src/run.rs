@@ -8,7 +8,7 @@ use crate::exact::Exact;
 use crate::light::Lit;
 use crate::measure::{Angles, Measures, Truth};
 use crate::method::{Method, Painter};
-use crate::motion::{Change, Changes, LEAD_IN, STEP_DEGREES, STEPS, same};
+use crate::motion::{Change, Changes, LEAD_IN_STEPS, STEP_DEGREES, STEPS, same};
 use crate::picture::Picture;
 use crate::still::{self, Still};
 use crate::subject::Subject;
@@ -40,7 +40,7 @@ pub struct Motion {
     /// Change of our pictures if each is rendered by itself.
     pub alone: Change,
     /// Mean error of normals in our picture of the last step, degrees: rendered by itself, and from earlier pictures.
-    pub degrees_off: [f64; 2],
+    pub last_normal_errors: [f64; 2],
 }
 
 /// The pictures of a case.
@@ -86,13 +86,13 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
     let mut follower = Painter::new(subject);
     let steady = Reconstruction { steady: true, ..Reconstruction::default() };
     let mut changes = vec![Changes::default(); 3 + methods.len()];
-    for step in (1..=LEAD_IN).rev() {
+    for step in (1..=LEAD_IN_STEPS).rev() {
         follower.render(steady.clone(), &orbit(&camera, step as f64 * -STEP_DEGREES), case.size)?;
     }
     let mut before: Option<(Exact, Vec<(Picture, Lit)>)> = None;
     for step in 0..=STEPS {
         let camera = orbit(&camera, step as f64 * STEP_DEGREES);
-        let exact = Exact::trace_alone(subject, &camera, case.size)?;
+        let exact = Exact::trace_surface(subject, &camera, case.size)?;
         let true_picture = Picture::truth(&exact);
         let lit = |picture: Picture| {
             let lit = Lit::new(&picture, &exact.rays);
@@ -115,12 +115,13 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
         before = Some((exact, pictures));
     }
     let last = Truth::new(Exact::trace(subject, &orbit(&camera, STEPS as f64 * STEP_DEGREES), case.size)?);
-    let degrees_off = |picture: Option<&(Picture, Lit)>| {
+    let last_normal_errors = |picture: Option<&(Picture, Lit)>| {
         let angles = picture.and_then(|(picture, lit)| last.measure(picture, lit, subject).angles);
         angles.map_or(f64::NAN, |angles| angles.mean)
     };
     let ours = 3 + methods.iter().position(|&method| method == Method::Ours).unwrap_or(methods.len());
-    let degrees_off = before.map_or([f64::NAN; 2], |(_, shown)| [2, ours].map(|at| degrees_off(shown.get(at))));
+    let last_normal_errors =
+        before.map_or([f64::NAN; 2], |(_, shown)| [2, ours].map(|at| last_normal_errors(shown.get(at))));
     let mut means = changes.iter().map(Changes::mean);
     let (Some(truth), Some(smooth), Some(alone)) = (means.next(), means.next(), means.next()) else {
         unreachable!("there are at least three changes")
@@ -130,7 +131,7 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
         smooth: smooth.lightness,
         methods: methods.into_iter().zip(means).collect(),
         alone,
-        degrees_off,
+        last_normal_errors,
     })
 }
 
@@ -193,7 +194,7 @@ pub(crate) mod tests {
             smooth: 1.0,
             methods: vec![(Method::Ours, change(ours))],
             alone: change(ours),
-            degrees_off: [1.0; 2],
+            last_normal_errors: [1.0; 2],
         };
         let still = Still { one_ray: 40.0, still: 33.0, methods: vec![(Method::Ours, psnr)] };
         Outcome { case: quick()[0], measures: methods, still, motion: Some(motion) }

@@ -17,7 +17,7 @@ use crate::rays::Rays;
 use crate::subject::Subject;
 
 /// Number of rays per pixel along each side.
-pub const RAYS: u32 = 4;
+pub const RAYS_PER_SIDE: u32 = 4;
 /// Factor of a still's width and height before averaging.
 pub const SUPERSAMPLE: u32 = 2;
 
@@ -37,8 +37,8 @@ pub struct Still {
 /// # Errors
 /// An invalid camera.
 pub fn smooth(subject: &Subject, camera: &Camera, size: [u32; 2]) -> Result<Lit> {
-    let fine = Exact::trace_alone(subject, camera, size.map(|side| side * RAYS))?;
-    Ok(Lit::new(&Picture::truth(&fine), &fine.rays).averaged(RAYS as usize))
+    let fine = Exact::trace_surface(subject, camera, size.map(|side| side * RAYS_PER_SIDE))?;
+    Ok(Lit::new(&Picture::truth(&fine), &fine.rays).averaged(RAYS_PER_SIDE as usize))
 }
 
 /// Measures each method's lit picture of a case, and our still.

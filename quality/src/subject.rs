@@ -24,7 +24,7 @@ use crate::sweep::Sweep;
 /// Number of neighbours from which the spacing of points is computed.
 const SPACING_K: NonZero<usize> = NonZero::new(10).expect("above 0");
 /// Greatest noise expected, in standard deviations.
-const NEARLY_ALL: f64 = 4.0;
+const MAX_NOISE_DEVIATIONS: f64 = 4.0;
 /// Axis about which a misregistered scan is turned. It need not have length 1.
 const TURN_AXIS: DVec3 = DVec3::new(0.48, 0.6, 0.64);
 /// Direction in which a misregistered scan is shifted. It need not have length 1.
@@ -188,7 +188,7 @@ pub struct Subject {
     /// The points without noise, misregistration and outliers, to render.
     pub clean_cloud: PointCloud,
     /// Greatest distance from the surface expected of a point that is no outlier, in world units.
-    pub blur: f64,
+    pub max_offset: f64,
     /// Diagonal of the box of [`clean`](Self::clean), in world units.
     pub diagonal: f64,
 }
@@ -199,7 +199,7 @@ impl Subject {
     /// # Errors
     /// The mesh cannot be read.
     pub fn new(recipe: Recipe) -> Result<Self> {
-        let (surface, even) = strew(&recipe)?;
+        let (surface, even) = sample_points(&recipe)?;
         let axes = even.axes();
         let (low, high) = bounds(even.positions());
         let diagonal = (high - low).length();
@@ -234,7 +234,9 @@ impl Subject {
             cloud: with_axes(PointCloud::new(even.origin(), positions)),
             clean: Neighbors::new(&even, SPACING_K),
             clean_cloud: even,
-            blur: NEARLY_ALL * (recipe.noise * diagonal + recipe.sweep.map_or(0.0, |sweep| sweep.noise)) + misplaced,
+            max_offset: MAX_NOISE_DEVIATIONS
+                * (recipe.noise * diagonal + recipe.sweep.map_or(0.0, |sweep| sweep.noise))
+                + misplaced,
             diagonal,
         })
     }
@@ -276,7 +278,7 @@ impl Subject {
 }
 
 /// The surface, and points on it without defects.
-fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
+fn sample_points(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
     let mesh = match recipe.source {
         Source::Scene(name) => {
             let (scene, _) = Scene::parse(name)?;
@@ -297,7 +299,7 @@ fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
     }
     let contents = mesh.contents();
     let (low, high) = bounds(contents.cloud.positions());
-    let keep = |p: &[f32; 3]| kept(recipe.density, (DVec3::from(p.map(f64::from)) - low) / (high - low));
+    let keep = |p: &[f32; 3]| keep_probability(recipe.density, (DVec3::from(p.map(f64::from)) - low) / (high - low));
     let sample = |count, seed| sample_surface(&contents, count, seed, &()).context("cannot sample points");
     let cloud = if recipe.density == Density::Even {
         sample(recipe.count, 1)?
@@ -319,7 +321,7 @@ fn swept(surface: Surface, sweep: Sweep, axes: Axes) -> (Surface, PointCloud) {
 }
 
 /// Probability of keeping a point. `at` is its place, 0 to 1 along each side of the box.
-fn kept(density: Density, at: DVec3) -> f64 {
+fn keep_probability(density: Density, at: DVec3) -> f64 {
     match density {
         Density::Even => 1.0,
         Density::Uneven => {

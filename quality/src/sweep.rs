@@ -14,9 +14,9 @@ use rayon::prelude::*;
 use crate::surface::Surface;
 
 /// Least cosine of the angle of incidence at which the sensor sees a place: that of 87°.
-const FLATTEST: f64 = 0.0523;
+const MIN_INCIDENCE_COSINE: f64 = 0.0523;
 /// Greatest difference of two distances from the sensor to one place, as a share of the distance.
-const BEFORE: f64 = 1e-3;
+const MAX_DISTANCE_DIFFERENCE: f64 = 1e-3;
 
 /// A spinning lidar and its place. Lengths are in metres, as in scenes, angles in degrees. The z axis points up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,9 +90,11 @@ impl Sweep {
             return f64::INFINITY;
         }
         let hit = surface.trace(self.origin(), direction);
-        let Some(hit) = hit.filter(|hit| (hit.distance - range).abs() < BEFORE * range) else { return f64::INFINITY };
+        let Some(hit) = hit.filter(|hit| (hit.distance - range).abs() < MAX_DISTANCE_DIFFERENCE * range) else {
+            return f64::INFINITY;
+        };
         let cos = hit.normal.dot(direction);
-        if !(cos.abs() >= FLATTEST) {
+        if !(cos.abs() >= MIN_INCIDENCE_COSINE) {
             return f64::INFINITY;
         }
         let [up, around] = self.steps();

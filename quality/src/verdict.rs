@@ -3,14 +3,14 @@
 use autosplats::cloud::glam::DVec3;
 use rayon::prelude::*;
 
-use crate::exact::{Exact, Seen};
-use crate::picture::{Picture, Shown};
+use crate::exact::{Exact, TrueSurface};
+use crate::picture::{DrawnSurface, Picture};
 use crate::subject::Subject;
 
 /// A pixel lies inside the silhouette if the true surface covers all pixels within this distance in x and in y.
 const INSIDE_PX: usize = 2;
 /// Fewest sampled pixels inside the silhouette from which shares are computed.
-const FEWEST: usize = 300;
+const MIN_INSIDE_PIXELS: usize = 300;
 
 /// The verdict on a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,7 +103,7 @@ impl Verdicts {
         let [right, leaks, before] = [Verdict::Right, Verdict::Leak, Verdict::Before].map(|what| count(&[what]));
         let covered = right + leaks + before + count(&[Verdict::Beside]);
         let missing = count(&[Verdict::Hole, Verdict::Short]);
-        let enough = if self.inside < FEWEST { f64::NAN } else { 1.0 };
+        let enough = if self.inside < MIN_INSIDE_PIXELS { f64::NAN } else { 1.0 };
         Cover {
             spacing_px: self.spacing_px,
             sampled: self.sampled,
@@ -137,7 +137,7 @@ fn inside(exact: &Exact, pixel: usize) -> bool {
 }
 
 /// The verdict where both pictures show a surface.
-fn compare(exact: &Exact, pixel: usize, seen: &Seen, shown: &Shown) -> Verdict {
+fn compare(exact: &Exact, pixel: usize, seen: &TrueSurface, shown: &DrawnSurface) -> Verdict {
     let tolerance = seen.tolerance;
     if (shown.depth - seen.depth).abs() <= tolerance {
         return Verdict::Right;

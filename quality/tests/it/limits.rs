@@ -12,7 +12,7 @@ use autosplats_quality::light::Lit;
 use autosplats_quality::measure::{Angles, Measures};
 use autosplats_quality::method::{Method, Painter};
 use autosplats_quality::motion::{Change, Changes, same};
-use autosplats_quality::picture::{Picture, Shown};
+use autosplats_quality::picture::{DrawnSurface, Picture};
 use autosplats_quality::random::Random;
 use autosplats_quality::run::{Pictures, measure};
 use autosplats_quality::still::Still;
@@ -49,20 +49,20 @@ struct Limits {
     still: f64,
 }
 
-const NONE: f64 = f64::NAN;
+const NO_LIMIT: f64 = f64::NAN;
 
 /// One line for each case: measured values with a few percent to spare. Better pictures call for tighter limits.
 #[rustfmt::skip]
 const LIMITS: [Limits; 9] = [
-    Limits { case: "figure:60K own", normals: [6.3, 7.9], ratios: [1.05, 1.05], flipped: [0.62, 0.07], holes: 0.02, leaks: 0.02, before: 0.25, iou: 0.982, depth_px: 0.39, psnr: 24.6, flip: 0.074, swept: [NONE; 3], motion: [1.18, 1.01], still: 3.1 },
-    Limits { case: "two-scales:150K own", normals: [4.65, 8.2], ratios: [1.02, 1.02], flipped: [0.46, 0.02], holes: 0.02, leaks: 0.02, before: 0.47, iou: 0.987, depth_px: 0.28, psnr: 27.5, flip: 0.056, swept: [NONE; 3], motion: [NONE; 2], still: 2.7 },
-    Limits { case: "statue:150K own", normals: [24.4, 26.1], ratios: [1.25, 1.22], flipped: [1.0, 0.12], holes: 0.045, leaks: 0.03, before: 0.37, iou: 0.975, depth_px: 0.82, psnr: 18.6, flip: 0.248, swept: [NONE; 3], motion: [NONE; 2], still: 3.9 },
-    Limits { case: "statue:150K near", normals: [16.2, 23.2], ratios: [1.00, 0.99], flipped: [1.57, 0.45], holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 1.88, psnr: 20.7, flip: 0.182, swept: [NONE; 3], motion: [NONE; 2], still: 0.1 },
-    Limits { case: "bumpy:200K front", normals: [0.42, 0.98], ratios: [0.95, 0.90], flipped: [0.02, 0.01], holes: 0.02, leaks: 0.02, before: 0.02, iou: 0.998, depth_px: 0.115, psnr: 43.0, flip: 0.013, swept: [NONE; 3], motion: [NONE; 2], still: 1.3 },
-    Limits { case: "bumpy:200K-uneven front", normals: [0.68, 1.50], ratios: [0.98, 0.92], flipped: [0.04, 0.02], holes: 0.02, leaks: 0.02, before: 0.03, iou: 0.998, depth_px: 0.100, psnr: 40.2, flip: 0.017, swept: [NONE; 3], motion: [NONE; 2], still: 0.5 },
-    Limits { case: "bumpy:200K-noise0.3% front", normals: [3.9, 5.8], ratios: [0.75, 0.60], flipped: [0.03, 0.03], holes: 0.03, leaks: 0.02, before: 0.15, iou: 0.993, depth_px: 1.02, psnr: 30.8, flip: 0.082, swept: [NONE; 3], motion: [0.92, 1.27], still: -0.4 },
-    Limits { case: "bumpy:200K-outliers2% front", normals: [0.67, 1.97], ratios: [1.15, 1.40], flipped: [0.14, 0.12], holes: 0.02, leaks: 0.02, before: 0.06, iou: 0.996, depth_px: 0.17, psnr: 33.5, flip: 0.017, swept: [NONE; 3], motion: [NONE; 2], still: 2.0 },
-    Limits { case: "herd:32x1024 behind", normals: [11.2, 37.3], ratios: [0.69, 0.95], flipped: [2.75, 1.6], holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 3.6, psnr: 19.4, flip: 0.156, swept: [98.6, 92.7, 10.0], motion: [NONE; 2], still: 0.0 },
+    Limits { case: "figure:60K own", normals: [6.3, 7.9], ratios: [1.05, 1.05], flipped: [0.62, 0.07], holes: 0.02, leaks: 0.02, before: 0.25, iou: 0.982, depth_px: 0.39, psnr: 24.6, flip: 0.074, swept: [NO_LIMIT; 3], motion: [1.18, 1.01], still: 3.1 },
+    Limits { case: "two-scales:150K own", normals: [4.65, 8.2], ratios: [1.02, 1.02], flipped: [0.46, 0.02], holes: 0.02, leaks: 0.02, before: 0.47, iou: 0.987, depth_px: 0.28, psnr: 27.5, flip: 0.056, swept: [NO_LIMIT; 3], motion: [NO_LIMIT; 2], still: 2.7 },
+    Limits { case: "statue:150K own", normals: [24.4, 26.1], ratios: [1.25, 1.22], flipped: [1.0, 0.12], holes: 0.045, leaks: 0.03, before: 0.37, iou: 0.975, depth_px: 0.82, psnr: 18.6, flip: 0.248, swept: [NO_LIMIT; 3], motion: [NO_LIMIT; 2], still: 3.9 },
+    Limits { case: "statue:150K near", normals: [16.2, 23.2], ratios: [1.00, 0.99], flipped: [1.57, 0.45], holes: NO_LIMIT, leaks: NO_LIMIT, before: NO_LIMIT, iou: NO_LIMIT, depth_px: 1.88, psnr: 20.7, flip: 0.182, swept: [NO_LIMIT; 3], motion: [NO_LIMIT; 2], still: 0.1 },
+    Limits { case: "bumpy:200K front", normals: [0.42, 0.98], ratios: [0.95, 0.90], flipped: [0.02, 0.01], holes: 0.02, leaks: 0.02, before: 0.02, iou: 0.998, depth_px: 0.115, psnr: 43.0, flip: 0.013, swept: [NO_LIMIT; 3], motion: [NO_LIMIT; 2], still: 1.3 },
+    Limits { case: "bumpy:200K-uneven front", normals: [0.68, 1.50], ratios: [0.98, 0.92], flipped: [0.04, 0.02], holes: 0.02, leaks: 0.02, before: 0.03, iou: 0.998, depth_px: 0.100, psnr: 40.2, flip: 0.017, swept: [NO_LIMIT; 3], motion: [NO_LIMIT; 2], still: 0.5 },
+    Limits { case: "bumpy:200K-noise0.3% front", normals: [3.9, 5.8], ratios: [0.75, 0.60], flipped: [0.03, 0.03], holes: 0.03, leaks: 0.02, before: 0.15, iou: 0.993, depth_px: 1.02, psnr: 30.8, flip: 0.082, swept: [NO_LIMIT; 3], motion: [0.92, 1.27], still: -0.4 },
+    Limits { case: "bumpy:200K-outliers2% front", normals: [0.67, 1.97], ratios: [1.15, 1.40], flipped: [0.14, 0.12], holes: 0.02, leaks: 0.02, before: 0.06, iou: 0.996, depth_px: 0.17, psnr: 33.5, flip: 0.017, swept: [NO_LIMIT; 3], motion: [NO_LIMIT; 2], still: 2.0 },
+    Limits { case: "herd:32x1024 behind", normals: [11.2, 37.3], ratios: [0.69, 0.95], flipped: [2.75, 1.6], holes: NO_LIMIT, leaks: NO_LIMIT, before: NO_LIMIT, iou: NO_LIMIT, depth_px: 3.6, psnr: 19.4, flip: 0.156, swept: [98.6, 92.7, 10.0], motion: [NO_LIMIT; 2], still: 0.0 },
 ];
 
 /// The limits that a picture misses.
@@ -83,7 +83,7 @@ fn misses(measures: &Measures, limits: &Limits) -> Vec<String> {
         ("PSNR", -measures.psnr, -limits.psnr),
         ("FLIP", measures.flip, limits.flip),
     ];
-    let swept = measures.swept.map_or([NONE; 3], |swept| [-swept.closed, -swept.right, swept.over]);
+    let swept = measures.swept.map_or([NO_LIMIT; 3], |swept| [-swept.closed, -swept.right, swept.over]);
     let [closed, right, over] = swept.map(|share| 100.0 * share);
     let most_swept =
         [("closed", closed, -limits.swept[0]), ("right", right, -limits.swept[1]), ("over", over, limits.swept[2])];
@@ -130,7 +130,7 @@ fn limits_of(case: &Case) -> &'static Limits {
 }
 
 /// Measures a case and checks its limits.
-fn hold(name: &str) {
+fn check_limits(name: &str) {
     let case = quick().into_iter().find(|case| case.name() == name).expect("a case of this name");
     let limits = limits_of(&case);
     let subject = Subject::new(case.recipe).expect("a subject");
@@ -154,47 +154,47 @@ fn hold(name: &str) {
 
 #[test]
 fn figure() {
-    hold("figure:60K own");
+    check_limits("figure:60K own");
 }
 
 #[test]
 fn two_scales() {
-    hold("two-scales:150K own");
+    check_limits("two-scales:150K own");
 }
 
 #[test]
 fn statue() {
-    hold("statue:150K own");
+    check_limits("statue:150K own");
 }
 
 #[test]
 fn statue_near() {
-    hold("statue:150K near");
+    check_limits("statue:150K near");
 }
 
 #[test]
 fn bumpy() {
-    hold("bumpy:200K front");
+    check_limits("bumpy:200K front");
 }
 
 #[test]
 fn bumpy_uneven() {
-    hold("bumpy:200K-uneven front");
+    check_limits("bumpy:200K-uneven front");
 }
 
 #[test]
 fn bumpy_with_noise() {
-    hold("bumpy:200K-noise0.3% front");
+    check_limits("bumpy:200K-noise0.3% front");
 }
 
 #[test]
 fn bumpy_with_outliers() {
-    hold("bumpy:200K-outliers2% front");
+    check_limits("bumpy:200K-outliers2% front");
 }
 
 #[test]
 fn herd_swept() {
-    hold("herd:32x1024 behind");
+    check_limits("herd:32x1024 behind");
 }
 
 /// The paper's settings, which do not adapt to noise, miss the limits.
@@ -231,24 +231,24 @@ fn every_case_has_its_line() {
 }
 
 /// A good picture to spoil.
-struct Sample {
+struct GoodPicture {
     subject: Subject,
     limits: &'static Limits,
     pictures: Pictures,
 }
 
-fn sample() -> &'static Sample {
-    static SAMPLE: OnceLock<Sample> = OnceLock::new();
+fn sample() -> &'static GoodPicture {
+    static SAMPLE: OnceLock<GoodPicture> = OnceLock::new();
     SAMPLE.get_or_init(|| {
         let case = quick().into_iter().find(|case| case.name() == "bumpy:200K front").expect("this case");
         let subject = Subject::new(case.recipe).expect("a subject");
         let mut painter = Painter::new(&subject);
         let (_, pictures) = measure(&case, &subject, &mut painter, &[Method::Ours]).expect("a measured case");
-        Sample { subject, limits: limits_of(&case), pictures }
+        GoodPicture { subject, limits: limits_of(&case), pictures }
     })
 }
 
-impl Sample {
+impl GoodPicture {
     fn picture(&self) -> &Picture {
         &self.pictures.drawn[0].1
     }
@@ -264,7 +264,7 @@ impl Sample {
     }
 
     /// The limits that the picture misses if one in `one_in` of its pixels is changed.
-    fn spoilt(&self, one_in: usize, change: impl Fn(Shown) -> Option<Shown>) -> String {
+    fn misses_of_spoilt(&self, one_in: usize, change: impl Fn(DrawnSurface) -> Option<DrawnSurface>) -> String {
         let is_chosen = |pixel| Random::new(5, pixel).unit() < 1.0 / one_in as f64;
         self.misses(&self.picture().changed(|pixel, shown| if is_chosen(pixel) { change(shown) } else { Some(shown) }))
     }
@@ -302,20 +302,23 @@ fn a_shifted_picture_is_noticed() {
 
 #[test]
 fn flipped_normals_are_noticed() {
-    let flipped = |shown: Shown| Some(Shown { normal: -shown.normal, ..shown });
-    notices(&sample().spoilt(200, flipped), &["above 90°", "flipped", "normals:", "PSNR"]);
+    let flipped = |shown: DrawnSurface| Some(DrawnSurface { normal: -shown.normal, ..shown });
+    notices(&sample().misses_of_spoilt(200, flipped), &["above 90°", "flipped", "normals:", "PSNR"]);
 }
 
 #[test]
 fn tilted_normals_are_noticed() {
     let tilt = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0_f64.to_radians());
-    notices(&sample().spoilt(2, |shown| Some(Shown { normal: tilt * shown.normal, ..shown })), &["normals:"]);
+    notices(
+        &sample().misses_of_spoilt(2, |shown| Some(DrawnSurface { normal: tilt * shown.normal, ..shown })),
+        &["normals:"],
+    );
     // A quarter of the pixels near silhouettes is too few to change the mean over all pixels.
     let sample = sample();
     let band = sample.pictures.truth.exact.band();
     let tilted = sample.picture().changed(|pixel, shown| {
         let is_chosen = band[pixel] && pixel % 4 == 0;
-        Some(if is_chosen { Shown { normal: tilt * shown.normal, ..shown } } else { shown })
+        Some(if is_chosen { DrawnSurface { normal: tilt * shown.normal, ..shown } } else { shown })
     });
     let misses = sample.misses(&tilted);
     notices(&misses, &["normals near silhouettes:"]);
@@ -337,36 +340,37 @@ fn what_is_open_or_closed_wrongly_between_rings_is_noticed() {
     let subject = Subject::new(case.recipe).expect("a subject");
     let mut painter = Painter::new(&subject);
     let (_, pictures) = measure(&case, &subject, &mut painter, &[Method::Ours]).expect("a measured case");
-    let sample = Sample { subject, limits: limits_of(&case), pictures };
+    let sample = GoodPicture { subject, limits: limits_of(&case), pictures };
     assert_eq!(sample.misses(sample.picture()), "", "the rest needs a good picture");
-    notices(&sample.spoilt(20, |_| None), &["closed"]);
-    let back = |shown: Shown| Some(Shown { depth: shown.depth + 0.3 * sample.subject.diagonal, ..shown });
-    let misses = sample.spoilt(20, back);
+    notices(&sample.misses_of_spoilt(20, |_| None), &["closed"]);
+    let back = |shown: DrawnSurface| Some(DrawnSurface { depth: shown.depth + 0.3 * sample.subject.diagonal, ..shown });
+    let misses = sample.misses_of_spoilt(20, back);
     notices(&misses, &["right"]);
     assert!(!misses.contains("closed"), "all pixels are covered: {misses}");
     // A screen in front of everything.
-    let near = Shown { depth: 0.5, normal: DVec3::Y, point: 0 };
+    let near = DrawnSurface { depth: 0.5, normal: DVec3::Y, point: 0 };
     let all = Picture { width: sample.picture().width, shown: vec![Some(near); sample.picture().shown.len()] };
     notices(&sample.misses(&all), &["over", "right"]);
 }
 
 #[test]
 fn holes_are_noticed() {
-    notices(&sample().spoilt(300, |_| None), &["holes"]);
+    notices(&sample().misses_of_spoilt(300, |_| None), &["holes"]);
 }
 
 #[test]
 fn leaks_are_noticed() {
     let sample = sample();
-    let back = |shown: Shown| Some(Shown { depth: shown.depth + 0.3 * sample.subject.diagonal, ..shown });
-    notices(&sample.spoilt(300, back), &["leaks", "depth"]);
+    let back = |shown: DrawnSurface| Some(DrawnSurface { depth: shown.depth + 0.3 * sample.subject.diagonal, ..shown });
+    notices(&sample.misses_of_spoilt(300, back), &["leaks", "depth"]);
 }
 
 #[test]
 fn what_floats_in_front_is_noticed() {
     let sample = sample();
-    let front = |shown: Shown| Some(Shown { depth: shown.depth - 0.3 * sample.subject.diagonal, ..shown });
-    notices(&sample.spoilt(300, front), &["before", "depth"]);
+    let front =
+        |shown: DrawnSurface| Some(DrawnSurface { depth: shown.depth - 0.3 * sample.subject.diagonal, ..shown });
+    notices(&sample.misses_of_spoilt(300, front), &["before", "depth"]);
 }
 
 #[test]
@@ -394,7 +398,7 @@ fn a_jittering_picture_is_noticed() {
         sample.picture().changed(|pixel, shown| {
             let turn = TAU * Random::new(7 + step as u64, pixel).unit();
             let axis = DVec3::new(turn.cos(), turn.sin(), 0.0);
-            Some(Shown { normal: DQuat::from_axis_angle(axis, 2.0_f64.to_radians()) * shown.normal, ..shown })
+            Some(DrawnSurface { normal: DQuat::from_axis_angle(axis, 2.0_f64.to_radians()) * shown.normal, ..shown })
         })
     };
     let change = |pictures: &[Picture]| {

@@ -105,7 +105,7 @@ fn every_other_point_is_of_a_second_scan() {
     let second: Vec<_> = lengths.iter().skip(1).step_by(2).collect();
     let mean = second.iter().copied().sum::<f64>() / second.len() as f64;
     assert!((0.0015..0.002).contains(&mean), "the second scan is shifted, and turned a little: {mean}");
-    assert!(subject.blur > 0.0015 * subject.diagonal, "the tolerance grows with the misregistration");
+    assert!(subject.max_offset > 0.0015 * subject.diagonal, "the tolerance grows with the misregistration");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use autosplats::cloud::glam::DVec3;
 use autosplats_quality::exact::Exact;
 use autosplats_quality::light::Lit;
 use autosplats_quality::measure::{Swept, Truth};
-use autosplats_quality::picture::{Picture, Shown};
+use autosplats_quality::picture::{DrawnSurface, Picture};
 use autosplats_quality::random::Random;
 use autosplats_quality::subject::{Recipe, Source, Subject};
 use autosplats_quality::sweep::Sweep;
@@ -66,7 +66,7 @@ fn noise_is_along_the_ray() {
     }
     let deviation = (squares / one.clean.len() as f64).sqrt();
     assert!((deviation / 0.02 - 1.0).abs() < 0.05, "standard deviation {deviation} along the ray");
-    assert!(one.blur >= 0.06, "the tolerance grows with the noise");
+    assert!(one.max_offset >= 0.06, "the tolerance grows with the noise");
 }
 
 #[test]
@@ -127,17 +127,17 @@ fn what_is_missing_wrong_or_too_much_is_noticed() {
     let near = |value: f64, expected: f64| (value - expected).abs() < 0.02;
     let gaps = measure(&right.changed(|pixel, shown| (!is_chosen(pixel)).then_some(shown)));
     assert!(near(gaps.closed, 0.8) && near(gaps.right, 0.8) && gaps.over == 0.0, "a fifth is missing: {gaps:?}");
-    let back = |shown: Shown| Shown { depth: shown.depth + 5.0, ..shown };
+    let back = |shown: DrawnSurface| DrawnSurface { depth: shown.depth + 5.0, ..shown };
     let deep = measure(&right.changed(|pixel, shown| Some(if is_chosen(pixel) { back(shown) } else { shown })));
     assert!(deep.closed == 1.0 && near(deep.right, 0.8), "a fifth shows surfaces behind: {deep:?}");
-    let sky = Some(Shown { depth: 10.0, normal: DVec3::Z, point: 0 });
+    let sky = Some(DrawnSurface { depth: 10.0, normal: DVec3::Z, point: 0 });
     let full = Picture { width: right.width, shown: right.shown.iter().map(|shown| shown.or(sky)).collect() };
     assert!(measure(&full).over > 0.5, "the sky is covered");
     let near_all = right.changed(|pixel, shown| {
-        Some(if truth.exact.is_asked(pixel) { shown } else { Shown { depth: shown.depth - 1.0, ..shown } })
+        Some(if truth.exact.is_measured(pixel) { shown } else { DrawnSurface { depth: shown.depth - 1.0, ..shown } })
     });
     assert!(measure(&near_all).over > 0.5, "surfaces float in front of each shadow");
-    let shadows = right.changed(|pixel, shown| truth.exact.is_asked(pixel).then_some(shown));
+    let shadows = right.changed(|pixel, shown| truth.exact.is_measured(pixel).then_some(shown));
     assert_eq!(measure(&shadows).closed, 1.0, "surfaces that the lidar does not see are not measured");
     let lit = Lit::new(&shadows, &truth.exact.rays);
     assert!(truth.measure(&shadows, &lit, &subject).psnr > 20.0, "they change the light only by occlusion beside them");

@@ -17,26 +17,26 @@ use autosplats_quality::subject::{Recipe, Source, Subject};
 use autosplats_quality::verdict::Verdicts;
 use autosplats_quality::view::Shot;
 
-/// Least intersection over union of the covered pixels, for pictures with a sampled share of at least [`SAMPLED`].
+/// Least intersection over union of the covered pixels, for pictures with a sampled share of at least [`MIN_SAMPLED`].
 /// The border of sparser points is undefined.
-const IOU: f64 = 0.985;
-/// Least share of the surface that is sampled where [`IOU`] applies.
-const SAMPLED: f64 = 0.85;
+const MIN_IOU: f64 = 0.985;
+/// Least share of the surface that is sampled where [`MIN_IOU`] applies.
+const MIN_SAMPLED: f64 = 0.85;
 /// Greatest share of empty pixels at least two pixels inside the true silhouette.
-const HOLES: f64 = 0.001;
+const MAX_HOLES: f64 = 0.001;
 /// Greatest share of pixels that show surfaces behind the true one, of covered pixels.
-const LEAKS: f64 = 0.002;
+const MAX_LEAKS: f64 = 0.002;
 /// Greatest mean error of normals over that of plane fits in the whole cloud. The cathedral is nearest to the limit.
-const NORMALS: f64 = 1.105;
+const MAX_NORMAL_RATIO: f64 = 1.105;
 
 /// A subject and the size of its pictures.
-struct Test {
+struct TestSubject {
     subject: Subject,
     size: [u32; 2],
 }
 
 /// A picture with its measures.
-struct Found {
+struct JudgedPicture {
     exact: Exact,
     picture: Picture,
     verdicts: Verdicts,
@@ -44,7 +44,7 @@ struct Found {
     angles: [f64; 2],
 }
 
-impl Test {
+impl TestSubject {
     fn new(name: &'static str, count: usize, size: [u32; 2]) -> Self {
         let subject = Subject::new(Recipe::new(Source::Scene(name), count)).expect("a scene of this name");
         Self { subject, size }
@@ -60,10 +60,10 @@ impl Test {
         Painter::new(&self.subject).render(reconstruction, &camera, self.size).expect("a frame")
     }
 
-    fn judge(&self, exact: Exact, picture: Picture) -> Found {
+    fn judge(&self, exact: Exact, picture: Picture) -> JudgedPicture {
         let verdicts = Verdicts::new(&exact, &picture, &self.subject);
         let angles = verdicts.normals_and_fits(&exact, &picture, &self.subject);
-        Found { exact, picture, verdicts, angles }
+        JudgedPicture { exact, picture, verdicts, angles }
     }
 
     /// Measures and prints all `shots`, and checks the limits. Each shot has the least share of its surface that must
@@ -87,7 +87,7 @@ impl Test {
     }
 }
 
-impl Found {
+impl JudgedPicture {
     fn ratio(&self) -> f64 {
         self.angles[0] / self.angles[1]
     }
@@ -97,11 +97,14 @@ impl Found {
         let cover = self.verdicts.cover();
         let mut misses = Vec::new();
         // NaN misses a limit.
-        if cover.sampled >= SAMPLED && !(cover.iou >= IOU) {
-            misses.push(format!("silhouette IoU {:.4} is below {IOU}", cover.iou));
+        if cover.sampled >= MIN_SAMPLED && !(cover.iou >= MIN_IOU) {
+            misses.push(format!("silhouette IoU {:.4} is below {MIN_IOU}", cover.iou));
         }
-        let limits =
-            [("holes", cover.holes, HOLES), ("leaks", cover.leaks, LEAKS), ("normal error", self.ratio(), NORMALS)];
+        let limits = [
+            ("holes", cover.holes, MAX_HOLES),
+            ("leaks", cover.leaks, MAX_LEAKS),
+            ("normal error", self.ratio(), MAX_NORMAL_RATIO),
+        ];
         for (what, value, most) in limits {
             if !(value <= most) {
                 misses.push(format!("{what} {value:.5} is above {most}"));
@@ -140,7 +143,7 @@ impl Found {
 
 #[test]
 fn figure() {
-    Test::new("figure", 300_000, [1280, 800]).meets_the_limits(&[
+    TestSubject::new("figure", 300_000, [1280, 800]).meets_the_limits(&[
         (Shot::Own, 0.85),
         (Shot::Whole(ViewDirection::Iso), 0.85),
         (Shot::Parallel(ViewDirection::Left), 0.85),
@@ -149,7 +152,7 @@ fn figure() {
 
 #[test]
 fn two_scales() {
-    Test::new("two-scales", 1_100_000, [1280, 800]).meets_the_limits(&[
+    TestSubject::new("two-scales", 1_100_000, [1280, 800]).meets_the_limits(&[
         (Shot::Own, 0.85),
         (Shot::Whole(ViewDirection::Iso), 0.85),
         (Shot::Parallel(ViewDirection::Front), 0.85),
@@ -158,7 +161,7 @@ fn two_scales() {
 
 #[test]
 fn statue() {
-    Test::new("statue", 800_000, [1600, 1000]).meets_the_limits(&[
+    TestSubject::new("statue", 800_000, [1600, 1000]).meets_the_limits(&[
         (Shot::Own, 0.85),
         (Shot::Whole(ViewDirection::Iso), 0.85),
         (Shot::Parallel(ViewDirection::Back), 0.85),
@@ -169,7 +172,7 @@ fn statue() {
 // herd seen from the left. Trimming opens holes in scanner shadows across the cathedral's nave.
 #[test]
 fn herd() {
-    Test::new("herd", 1_000_000, [1280, 800]).meets_the_limits(&[
+    TestSubject::new("herd", 1_000_000, [1280, 800]).meets_the_limits(&[
         (Shot::Own, 0.2),
         (Shot::Whole(ViewDirection::Iso), 0.2),
         (Shot::Parallel(ViewDirection::Top), 0.1),
@@ -179,13 +182,13 @@ fn herd() {
 #[test]
 fn cathedral() {
     let aisle = Shot::From([-3.0, 7.0, 2.0], [14.0, 6.5, 4.0], 60.0);
-    Test::new("cathedral", 3_000_000, [960, 600]).meets_the_limits(&[(Shot::Own, 0.35), (aisle, 0.1)]);
+    TestSubject::new("cathedral", 3_000_000, [960, 600]).meets_the_limits(&[(Shot::Own, 0.35), (aisle, 0.1)]);
 }
 
 /// Each measure notices its own defect.
 #[test]
 fn poor_pictures_miss_the_limits() {
-    let test = Test::new("figure", 300_000, [1280, 800]);
+    let test = TestSubject::new("figure", 300_000, [1280, 800]);
     let exact = test.exact(Shot::Own);
     let misses = |picture: &Picture| {
         let found = test.judge(exact.clone(), picture.clone());
