@@ -18,7 +18,6 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    super::table::Scalar,
     dimension::{Dimension, Source, zeroed},
     extra::Extra,
     header::Header,

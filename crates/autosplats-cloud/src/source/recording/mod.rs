@@ -139,7 +139,7 @@ impl Recording {
                 let noted = format!("{}: {}", fault.place(), fault.what);
                 progress.note(&crate::error::message(&noted));
                 statistics.refused += 1;
-                statistics.last_refusal = Some(crate::error::message(&format!("{}: {told}", file.path.display())));
+                statistics.last_refusal = Some(crate::error::message(&format!("{}: {noted}", file.path.display())));
             }
         }
 
