@@ -11,7 +11,7 @@ use super::boxes::Bounds;
 use super::nearest::Nearest;
 use super::tree::{Leaf, Tree};
 use crate::search::moments::{squared_distances, sum_moments};
-use crate::search::select::{GROUP, kth_smallest};
+use crate::search::select::{CANDIDATE_GROUP, kth_smallest};
 use crate::search::{LANES, Lanes, NeighborhoodBlock};
 
 /// Radius of the first list over the expected k-radius. The time hardly depends on this value.
@@ -85,7 +85,7 @@ pub(super) fn search_leaf<S: Simd>(
             radius *= (k as f32 / listed.max(1) as f32).clamp(least, most);
             continue;
         }
-        let candidates = &scratch.candidates[..listed.next_multiple_of(GROUP)];
+        let candidates = &scratch.candidates[..listed.next_multiple_of(CANDIDATE_GROUP)];
         squared_distances(simd, &position, candidates, &mut scratch.squared);
         kth_smallest(simd, &scratch.squared, k, &pending, &mut threshold);
         let mut done = [false; LANES];
@@ -148,8 +148,8 @@ fn list<S: Simd>(
     most: usize,
     candidates: &mut Vec<[f32; 3]>,
 ) -> Option<usize> {
-    if candidates.len() < most + LANES + GROUP {
-        candidates.resize(most + LANES + GROUP, [0.0; 3]);
+    if candidates.len() < most + LANES + CANDIDATE_GROUP {
+        candidates.resize(most + LANES + CANDIDATE_GROUP, [0.0; 3]);
     }
     let mut len = 0;
     // Seven levels hold every cloud, and each leaves at most fifteen children waiting.
@@ -186,6 +186,6 @@ fn list<S: Simd>(
             }
         }
     }
-    candidates[len..len + GROUP].fill([f32::INFINITY; 3]);
+    candidates[len..len + CANDIDATE_GROUP].fill([f32::INFINITY; 3]);
     Some(len)
 }
