@@ -19,7 +19,7 @@ const SIZE: [u32; 2] = [480, 300];
 
 /// Fraction of the pixels that may differ by more than two steps of brightness. Divisions on a device may be off in the
 /// last place, which moves a few points in ten thousand to the next pixel.
-const UNLIKE: f64 = 1e-3;
+const MAX_DIFFERENT_SHARE: f64 = 1e-3;
 
 fn gpu() -> Option<Renderer> {
     match Renderer::with_backend(Backend::Gpu) {
@@ -61,7 +61,7 @@ fn compare(gpu: &mut Renderer, cloud: &PointCloud, camera: &Camera, size: [u32; 
     let device = gpu.render(cloud, camera, size, settings).unwrap_or_else(|error| panic!("{case}: {error}"));
     let unlike = unlike(host.image, device.image);
     // One pixel of a small picture is more than a thousandth.
-    let allowed = UNLIKE.max(1.0 / host.image.pixels.len() as f64);
+    let allowed = MAX_DIFFERENT_SHARE.max(1.0 / host.image.pixels.len() as f64);
     assert!(unlike <= allowed, "{case}: {unlike} of the pixels differ");
     let near = |a: usize, b: usize, name: &str| {
         assert!(a.abs_diff(b) <= 2 + a / 100, "{case}: {name} {a} on the CPU, {b} on the GPU");
@@ -108,7 +108,7 @@ fn compare_layers(a: &GBuffer, b: &GBuffer, case: &str) {
     });
     let differing = differing.count();
     assert!(
-        differing as f64 <= 2.0 * UNLIKE * (width * height) as f64 + 1.0,
+        differing as f64 <= 2.0 * MAX_DIFFERENT_SHARE * (width * height) as f64 + 1.0,
         "{case}: {differing} pixels of the layers"
     );
 }
@@ -124,7 +124,7 @@ fn comparison_sees_another_picture() {
         };
         renderer.render(&cloud, &camera, SIZE, &settings).expect("a picture").image.clone()
     };
-    assert!(unlike(&image(1.0), &image(1.2)) > 2.0 * UNLIKE, "splats a fifth wider make another picture");
+    assert!(unlike(&image(1.0), &image(1.2)) > 2.0 * MAX_DIFFERENT_SHARE, "splats a fifth wider make another picture");
 }
 
 #[test]
@@ -267,7 +267,10 @@ fn adapted_or_not_is_seen_by_the_comparison() {
         let settings = Settings { reconstruction, ..Settings::default() };
         renderer.render(&cloud, &camera, SIZE, &settings).expect("a picture").image.clone()
     };
-    assert!(unlike(&image(false), &image(true)) > 10.0 * UNLIKE, "noise shows where nothing is adapted to it");
+    assert!(
+        unlike(&image(false), &image(true)) > 10.0 * MAX_DIFFERENT_SHARE,
+        "noise shows where nothing is adapted to it"
+    );
 }
 
 #[test]
