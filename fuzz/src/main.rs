@@ -1,13 +1,15 @@
-//! Mutated files for every reader: no panic, no long wait, no memory beyond a bound, one line of message.
+//! Feeds mutated files to every reader. A reader must not panic, exceed the limits of time and memory, or write a
+//! message of several lines.
 //!
 //! # How it works
 //!
-//! Each format has small seed files (see [`seeds`]). Every input is a seed, or an earlier input that was answered in a
-//! new way, changed by [`mod@mutate`]; the same `--seed` on as many cores makes the same inputs in the same order. An input
-//! is described and read from memory, on one thread; a child process per core does a share. Panics in code of others,
-//! which readers turn into errors, are counted; any other panic is a finding, as are time and memory beyond the limits. A
-//! finding is written to `target/fuzz`, and the program fails. An input that ends the process, as by overflowing the
-//! stack, is found there too: each is left in a file of its process before it is tried.
+//! Each format has small seed files (see [`seeds`]). [`mod@mutate`] changes a seed, or an earlier input that got a new
+//! answer. The same `--seed` on the same number of cores makes the same inputs in the same order. A child process per
+//! core takes a share of the inputs. It describes and reads an input from memory, on one thread.
+//!
+//! Readers turn panics of libraries into errors, and the fuzzer counts these. Any other panic is a finding, and so is
+//! exceeding a limit. Findings are written to `target/fuzz`, and the program fails. A process writes each input to a
+//! file before trying it. So an input that ends the process, such as by a stack overflow, is there too.
 
 mod meter;
 mod mutate;
@@ -38,38 +40,39 @@ use clap::Parser;
 use crate::mutate::{Random, mutate, repair_pages};
 use crate::seeds::{Seeds, add_corpus, all};
 
-/// What any input may take; far more than a sane answer needs, far less than a claimed count would.
+/// Time limit for an input: far more than a sound reader needs, far less than it takes to follow a false count.
 const TIME: Duration = Duration::from_secs(2);
 
-/// Bytes of memory for every byte of a file, and what any file may take. Compressed points can be many.
+/// Memory limit per byte of a file, in bytes, beyond `MEMORY`. Compression can put many points into a byte.
 const MEMORY_PER_BYTE: usize = 1 << 14;
+/// Memory that any file may take, in bytes.
 const MEMORY: usize = 16 << 20;
 
-/// Inputs that taught something new, kept to be changed further.
+/// Most inputs in the pool: the seeds, and inputs with new answers, which are mutated further.
 const POOL: usize = 512;
 
-/// Findings of a format after which it is given up.
+/// Number of findings after which a format ends.
 const ENOUGH: usize = 10;
 
 /// Feeds changed files to every reader.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// Formats to try, as the file extensions that seeds have [default: all]
+    /// Formats to try, by the extensions of their seeds [default: all]
     #[arg(long = "reader", value_name = "EXTENSION")]
     readers: Vec<String>,
-    /// Time for all formats together
+    /// Seconds for all formats together
     #[arg(long, default_value_t = 60)]
     seconds: u64,
-    /// Inputs for each format, however long that takes
+    /// Number of inputs per format, whatever time they take
     #[arg(long, conflicts_with = "seconds")]
     inputs: Option<u64>,
-    /// Another seed makes other inputs
+    /// Seed of the random numbers; another seed makes other inputs
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Take the files of a folder, up to 64 KB each, as further seeds
     #[arg(long, value_name = "FOLDER")]
     corpus: Option<PathBuf>,
-    /// Share of this process among how many
+    /// Share of this process, as INDEX/COUNT
     #[arg(long, hide = true, value_parser = share)]
     share: Option<[u64; 2]>,
 }
@@ -94,7 +97,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// One process per core, so that what is measured is one reader's doing.
+/// Starts one process per core, so that each measures the time and memory of a single reader.
 fn start() -> Result<()> {
     let cores = std::thread::available_parallelism()?.get() as u64;
     let start = Instant::now();
@@ -124,17 +127,17 @@ fn start() -> Result<()> {
     Ok(())
 }
 
-/// Where findings are kept.
+/// Folder for findings.
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/fuzz")
 }
 
-/// The file in which a process leaves each input before it is tried: the name's length, the input's, the name, the input.
+/// File to which a process writes each input before trying it: length of the name, length of the input, name, input.
 fn last_file(share: usize) -> PathBuf {
     folder().join(format!("last-{share}"))
 }
 
-/// Takes the input out of such a file and keeps it as a finding.
+/// Copies the input from the file of a process that ended, as a finding, and returns its path.
 fn last_input(share: usize) -> Result<PathBuf> {
     let left = std::fs::read(last_file(share))?;
     let number = |at: usize| left.get(at..at + 8).and_then(|raw| raw.try_into().ok()).map(u64::from_le_bytes);
@@ -147,7 +150,7 @@ fn last_input(share: usize) -> Result<PathBuf> {
 
 fn work(arguments: &Arguments, share: [u64; 2]) -> Result<()> {
     std::fs::create_dir_all(folder())?;
-    // Inside the pool, parallel loops run here instead of being handed over.
+    // The main thread is the only thread of the pool, so parallel loops run on it.
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()?;
     let mut formats = all()?;
     if let Some(folder) = &arguments.corpus {
@@ -182,13 +185,13 @@ enum Limit {
     Time(Duration),
 }
 
-/// The inputs of one format.
+/// The inputs of one format, and what the answers were.
 struct Run<'a> {
     seeds: &'a Seeds,
     seed: u64,
     share: [u64; 2],
     pool: Vec<Vec<u8>>,
-    /// Answers without their numbers; a new one is a new way through the reader.
+    /// Answers without digits. A new answer shows a new path through the reader.
     answers: HashSet<String>,
     accepted: u64,
     contained: u64,
@@ -215,7 +218,7 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Tries inputs up to the limit; returns how many were findings.
+    /// Tries inputs up to the limit. Returns the number of findings.
     fn go(mut self, limit: &Limit) -> Result<usize> {
         let name = format!("a.{}", self.seeds.extension);
         for (index, file) in self.seeds.files.iter().enumerate().take(self.seeds.own) {
@@ -256,7 +259,7 @@ impl<'a> Run<'a> {
 
     fn one(&mut self, name: &Path, number: u64) -> Result<()> {
         let mut random = Random(self.seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ number << 20);
-        // Half of the inputs begin with a sound file: what is broken already seldom gets far.
+        // Half of the inputs start from a seed, because readers reject a broken file early.
         let from = if random.below(2) == 0 { &self.seeds.files } else { &self.pool };
         let mut bytes = from[random.below(from.len())].clone();
         mutate(&mut bytes, &self.seeds.files, &mut random);
@@ -320,7 +323,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Leaves an input where it is found should it end the process.
+    /// Writes an input to the file of this process, in case it ends the process.
     fn leave(&mut self, name: &Path, bytes: &[u8]) -> Result<()> {
         let name = name.as_os_str().as_encoded_bytes();
         let lens = [name.len() as u64, bytes.len() as u64].map(u64::to_le_bytes);
@@ -329,9 +332,9 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Keeps an input that was answered in a new way.
+    /// Adds an input to the pool if its answer is new.
     fn learn(&mut self, answer: &str, bytes: &[u8]) {
-        // What stands in quotes comes out of the input.
+        // Quoted text comes from the input, so it makes no answer new.
         let unquoted = answer.split('\'').next().unwrap_or_default();
         let kind: String = unquoted.chars().filter(|c| !c.is_ascii_digit()).take(60).collect();
         if self.answers.len() < 1 << 16 && self.answers.insert(kind) && self.pool.len() < POOL {
@@ -340,7 +343,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Listens as the viewer would.
+/// Progress that checks what readers report, and may ask for chunks, as the viewer does.
 struct Watcher {
     chunks: bool,
     notes: Mutex<Vec<String>>,
@@ -364,7 +367,7 @@ impl Progress for Watcher {
     }
 }
 
-/// Writes a finding where it can be looked at.
+/// Writes a finding to `folder` and returns its path.
 fn keep(extension: &str, number: u64, bytes: &[u8]) -> Result<PathBuf> {
     let path = folder().join(format!("{number}.{extension}"));
     std::fs::write(&path, bytes)?;

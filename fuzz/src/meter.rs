@@ -1,4 +1,4 @@
-//! An allocator that counts.
+//! A global allocator that counts bytes.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -35,7 +35,7 @@ unsafe impl GlobalAlloc for Meter {
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
-        // While the bytes move, both blocks exist.
+        // Both blocks exist while the bytes move.
         add(new_size);
         NOW.fetch_sub(layout.size(), Relaxed);
         // SAFETY: the caller keeps the contract of `realloc`.
@@ -48,7 +48,7 @@ fn add(bytes: usize) {
     PEAK.fetch_max(now, Relaxed);
 }
 
-/// The most bytes that were allocated at once while `work` ran, beyond what was allocated before. Counts all threads.
+/// Runs `work`. Returns its result and the peak of allocated bytes beyond those at the start, of all threads.
 pub(crate) fn measured<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let before = NOW.load(Relaxed);
     PEAK.store(before, Relaxed);

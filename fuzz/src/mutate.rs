@@ -1,6 +1,6 @@
-//! Files made wrong, the same way on every computer.
+//! Mutations of files, the same on every computer.
 
-/// Splitmix.
+/// Pseudo-random numbers by splitmix64.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -21,7 +21,7 @@ impl Random {
     }
 }
 
-/// Values that sit at the edges of what readers compute with.
+/// Values at the limits of the integers that readers compute with.
 const EDGES: [u64; 16] = [
     0,
     1,
@@ -41,7 +41,7 @@ const EDGES: [u64; 16] = [
     353_535_235_358,
 ];
 
-/// Words that text readers stumble over.
+/// Words that text readers may handle wrongly.
 const WORDS: [&str; 28] = [
     "0",
     "-0",
@@ -73,9 +73,9 @@ const WORDS: [&str; 28] = [
     "\u{0}",
 ];
 
-/// Changes a file in one to eight ways. `others` are files of the same format to take pieces from.
+/// Applies one to eight mutations to a file. Pieces come from `others`, files of the same format.
 pub(crate) fn mutate(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
-    // Most faults lie near the beginning, where the headers are.
+    // Most faults lie near the start of a file, where the headers are, so half of the places are there.
     let ways = if random.below(4) > 0 { 1 } else { 2 + random.below(7) };
     for _ in 0..ways {
         let near = if random.below(2) == 0 { bytes.len().min(512) } else { bytes.len() };
@@ -126,7 +126,7 @@ fn bit(bytes: &mut [u8], at: usize, random: &mut Random) {
     }
 }
 
-/// An integer at the edge of its range, in either byte order.
+/// Writes one of `EDGES` with 1, 2, 4 or 8 bytes, in either byte order.
 fn edge(bytes: &mut [u8], at: usize, random: &mut Random) {
     let size = random.pick(&[1, 2, 4, 8]);
     let value = random.pick(&EDGES);
@@ -139,7 +139,7 @@ fn edge(bytes: &mut [u8], at: usize, random: &mut Random) {
     }
 }
 
-/// One more or one less: what counts and sizes are hurt by most.
+/// Adds or subtracts 1, or adds 2 or 16, to break counts and sizes by a little.
 fn small_step(bytes: &mut [u8], at: usize, random: &mut Random) {
     if let Some(byte) = bytes.get_mut(at) {
         *byte = byte.wrapping_add(random.pick(&[1, 0xff, 2, 16]));
@@ -147,13 +147,13 @@ fn small_step(bytes: &mut [u8], at: usize, random: &mut Random) {
 }
 
 fn insert(bytes: &mut Vec<u8>, at: usize, piece: &[u8]) {
-    // Files that grow without end would only make the run slower.
+    // Large files only slow the run down.
     if bytes.len() < 1 << 15 {
         bytes.splice(at..at, piece.iter().copied());
     }
 }
 
-/// Replaces the run of printable characters at a place.
+/// Replaces the word around a place by one of `WORDS`.
 fn word(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     let separates = |byte: &u8| byte.is_ascii_whitespace() || matches!(byte, b',' | b'"' | b'<' | b'>' | b'=' | b':');
     let start = bytes[..at].iter().rposition(separates).map_or(0, |found| found + 1);
@@ -162,7 +162,7 @@ fn word(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     bytes.splice(start.max(at.saturating_sub(64))..at + len, word.bytes());
 }
 
-/// Removes, doubles or moves a line.
+/// Removes, doubles or moves the line around a place.
 fn line(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     let start = bytes[..at].iter().rposition(|&byte| byte == b'\n').map_or(0, |found| found + 1);
     let end = bytes[at..].iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |found| at + found + 1);
@@ -178,7 +178,7 @@ fn line(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     }
 }
 
-/// Makes the checksums of E57 pages right again, as a fuzzer's changes would else end there.
+/// Corrects the checksums of E57 pages, so that the reader gets beyond them.
 pub(crate) fn repair_pages(bytes: &mut [u8]) {
     const PAGE: usize = 1024;
     for page in bytes.chunks_exact_mut(PAGE) {

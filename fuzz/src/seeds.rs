@@ -1,4 +1,4 @@
-//! Small whole files of every format, in every variant that is read differently.
+//! Small complete files of every format, with a variant for each path through its reader.
 
 use std::path::Path;
 
@@ -13,18 +13,18 @@ use crate::{
 
 /// Files of one format.
 pub(crate) struct Seeds {
-    /// Their extension.
+    /// The extension of the files, without a dot.
     pub(crate) extension: &'static str,
-    /// Their contents.
+    /// The contents of the files.
     pub(crate) files: Vec<Vec<u8>>,
-    /// How many of them are made here, hence sound; those of a corpus need not be.
+    /// Number of files at the start of `files` that are generated, hence sound. Files of a corpus may be broken.
     pub(crate) own: usize,
 }
 
-/// Points of a seed: few, so that many inputs fit into a second.
+/// Number of points in a seed. Few points make many inputs a second.
 const POINTS: usize = 24;
 
-/// Longer files of a corpus would only make the run slower.
+/// Most bytes of a file of a corpus. Larger files only slow the run down.
 const MAX_SEED: u64 = 64 << 10;
 
 pub(crate) fn all() -> Result<Vec<Seeds>> {
@@ -62,7 +62,8 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
     ])
 }
 
-/// The files of a folder, and of those in it, as further seeds of the formats that their names tell.
+/// Adds the files of a folder and its subfolders to the seeds of the formats that their extensions name. Returns the
+/// number of added files.
 pub(crate) fn add_corpus(seeds: &mut [Seeds], folder: &Path) -> Result<usize> {
     let mut added = 0;
     let mut entries: Vec<_> = std::fs::read_dir(folder)
@@ -77,7 +78,7 @@ pub(crate) fn add_corpus(seeds: &mut [Seeds], folder: &Path) -> Result<usize> {
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let ends = |seeds: &&mut Seeds| name.strip_suffix(seeds.extension).is_some_and(|stem| stem.ends_with('.'));
-        // Of .bin and .pcd.bin the longer one is meant.
+        // The longest extension counts: .pcd.bin is not .bin.
         let of = seeds.iter_mut().filter(|seeds| ends(seeds)).max_by_key(|seeds| seeds.extension.len());
         if let Some(seeds) = of
             && path.metadata()?.len() <= MAX_SEED
@@ -89,7 +90,7 @@ pub(crate) fn add_corpus(seeds: &mut [Seeds], folder: &Path) -> Result<usize> {
     Ok(added)
 }
 
-/// Clouds of several kinds in a format that the project writes.
+/// Files that the project writes: bare points, points with colours and fields, and scans far from the origin.
 fn written(extension: &str) -> Result<Vec<Vec<u8>>> {
     let bare = PointCloud::new(DVec3::ZERO, (0..POINTS).map(|i| [i as f32, (i * i % 7) as f32, 0.5]).collect());
     let byte = |i: usize| i as u8;
@@ -145,7 +146,7 @@ fn ascii_pcd() -> Vec<u8> {
         .to_vec()
 }
 
-/// Literal runs only, as a compressor that finds nothing makes them.
+/// A compressed PCD file of literal runs, as a compressor writes that finds no repetition.
 fn compressed_pcd() -> Vec<u8> {
     let mut bytes = b"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 8\nHEIGHT 1\n\
                       VIEWPOINT 1 2 3 1 0 0 0\nPOINTS 8\nDATA binary_compressed\n"
@@ -177,7 +178,7 @@ fn mesh_ply() -> Vec<u8> {
     bytes
 }
 
-/// Every point format, with a byte more than it needs where records may be longer.
+/// A LAS or LAZ file per point format, two of three with extra bytes. LAZ lacks the formats with waveforms.
 fn las(compressed: bool) -> Result<Vec<Vec<u8>>> {
     let one = |format: u8| {
         let mut builder = las::Builder::from(if format < 6 { (1, 3) } else { (1, 4) });
@@ -237,7 +238,7 @@ fn text_stl() -> Vec<u8> {
     format!("solid a\n{}endsolid a\n", facet.repeat(3)).into_bytes()
 }
 
-/// Positions, colours and corners of a triangle, the first of them with a sparse change.
+/// The JSON of a glTF triangle with colours, indices and sparse positions. `buffer` is the start of its buffer object.
 fn scene(buffer: &str) -> String {
     format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"children":[1],"translation":[1,2,3]}},{{"mesh":0,"scale":[1,2,3]}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"COLOR_0":2}},"indices":1,"mode":4}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","sparse":{{"count":1,"indices":{{"bufferView":1,"componentType":5123}},"values":{{"bufferView":0}}}}}},{{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}},{{"bufferView":2,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"}}],"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}},{{"buffer":0,"byteOffset":44,"byteLength":12}}],"buffers":[{{{buffer}"byteLength":56}}]}}"#
@@ -294,7 +295,7 @@ fn png() -> Result<Vec<u8>> {
     Ok(bytes.into_inner())
 }
 
-/// A message of points, with a colour, several values of one name and gaps.
+/// A `PointCloud2` message with intensities, colours, a field of two values and times.
 fn cloud2() -> Cloud2 {
     let positions: Vec<[f32; 3]> = (0..POINTS).map(|i| [i as f32, (i * i % 7) as f32, 0.5]).collect();
     let mut message = Cloud2::xyz(&positions, 32);
@@ -302,7 +303,7 @@ fn cloud2() -> Cloud2 {
     message
 }
 
-/// Points of two topics and transforms, compressed in every way, with an index and without.
+/// Recordings of two topics of points and one of transforms, for each compression, with and without an index.
 fn recordings(compressed: &'static str, write: fn(&[Topic], &[Message], Style) -> Vec<u8>) -> Vec<Vec<u8>> {
     let encoding = Encoding::Ros1;
     let topics: [Topic; 3] = [("/a", CLOUDS, encoding), ("/b", CLOUDS, encoding), ("/tf", TRANSFORMS, encoding)];

@@ -1,4 +1,4 @@
-//! What an input is fed to, by the extension of its name.
+//! The readers of an input, chosen by its extension.
 
 use std::{path::Path, time::Duration};
 
@@ -8,7 +8,7 @@ use autosplats_cloud::{
     read_bytes, read_mesh_bytes,
 };
 
-/// The encoding, of a message without a recording around it.
+/// The encoding of a bare message. `None` for all other files.
 fn message(name: &Path) -> Option<Encoding> {
     match name.extension()?.to_str()? {
         "ros1" => Some(Encoding::Ros1),
@@ -21,12 +21,12 @@ fn is_recording(name: &Path) -> bool {
     name.extension().is_some_and(|extension| extension == "mcap" || extension == "bag")
 }
 
-/// Describes a file as far as that is done.
+/// Describes a file. Recordings and bare messages have no description.
 pub(crate) fn describe(name: &Path, bytes: &[u8], options: &ReadOptions) -> Result<(), Error> {
     if is_recording(name) || message(name).is_some() { Ok(()) } else { describe_bytes(name, bytes, options).map(drop) }
 }
 
-/// Reads all points and returns how many there are. Of a recording whose messages are refused, the last refusal.
+/// Reads all points and returns their number. If messages of a recording are refused, returns the last error.
 pub(crate) fn read(
     name: &Path,
     bytes: &[u8],

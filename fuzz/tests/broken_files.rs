@@ -1,4 +1,4 @@
-//! A minute of broken files, as a part of all tests.
+//! Runs the fuzzer for a minute as one of the tests.
 
 use std::process::Command;
 
