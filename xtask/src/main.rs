@@ -5,6 +5,7 @@ mod layers;
 mod lengths;
 mod machine;
 mod peers;
+mod performance;
 mod pictures;
 mod programs;
 mod test;
@@ -26,6 +27,9 @@ usage: cargo xtask test               everything that a change has to pass: rule
                                   what changed between two such files; fails if an error grew by more than 3 %
        cargo xtask formats            docs/FORMATS.md, from what the program says of its formats and of the test data;
                                   with --check only whether it is what this build makes
+       cargo xtask performance --page | --machine NAME [--only TEXT] [--program PATH --commit HASH]
+                                  docs/PERFORMANCE.md, from docs/performance/*.json; NAME.json is measured first, in some ten
+                                  minutes, with --only those jobs that contain TEXT, as gpu does, with --program another build
        cargo xtask pictures OUT [--program PATH]
                                   a fixed list of pictures, layers and normals in the empty folder OUT, with a hash of each
        cargo xtask pictures --compare BEFORE AFTER
@@ -44,6 +48,7 @@ fn main() -> ExitCode {
         ["quality", options @ ..] => root().and_then(|root| quality(root, options)),
         ["formats"] => root().and_then(|root| formats::write(root, &formats::build(root)?)),
         ["formats", "--check"] => root().and_then(|root| formats::check(root, &formats::build(root)?)),
+        ["performance", options @ ..] => root().and_then(|root| performance::run(root, options)),
         ["pictures", "--compare", before, after] => {
             root().and_then(|root| pictures::run(root, &pictures::Task::Compare([before.as_ref(), after.as_ref()])))
         }
