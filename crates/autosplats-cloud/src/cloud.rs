@@ -11,6 +11,21 @@ use crate::{Crs, Error, Progress, identity::Identity};
 /// A position is stored as three `f32` relative to an `f64` [`origin`](Self::origin). Survey coordinates reach 5e6,
 /// where one `f32` step is half a metre. World coordinates are `origin + position`, plus a [residual](Self::residuals)
 /// if the file was read [exactly](crate::ReadOptions::exact). Every attribute has one entry per point.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{FieldValues, PointCloud, glam::DVec3};
+///
+/// let origin = DVec3::new(512_000.0, 5_400_000.0, 310.0);
+/// let cloud = PointCloud::new(origin, vec![[0.5, 0.25, 0.0], [1.5, 0.25, 0.125]])
+///     .with_colors(vec![[200, 180, 160]; 2])?
+///     .with_field("Intensity", FieldValues::U16(vec![900, 1200]))?;
+/// assert_eq!(cloud.len(), 2);
+/// assert_eq!(cloud.world_position(1), DVec3::new(512_001.5, 5_400_000.25, 310.125));
+/// assert_eq!(cloud.field("intensity").map(|field| field.values.get(1)), Some(1200.0));
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
     pub(crate) origin: DVec3,
@@ -26,6 +41,21 @@ pub struct PointCloud {
 }
 
 /// A contiguous range of points that one sensor saw from one place.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{PointCloud, Scan, glam::{DMat4, DVec3}};
+///
+/// let place = DVec3::new(0.0, 0.0, 1.8);
+/// let scan = Scan {
+///     name: Some("hall".into()),
+///     world_from_sensor: DMat4::from_translation(place),
+///     points: 0..2,
+/// };
+/// let cloud = PointCloud::new(DVec3::ZERO, vec![[4.0, 0.0, 0.0]; 3]).with_scans(vec![scan]);
+/// assert_eq!(cloud.scans()[0].position(), place);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
     /// Name in the file.

@@ -3,6 +3,17 @@
 use std::path::PathBuf;
 
 /// Errors of reading, writing or generating a cloud. Each message is one line.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{Error, ReadOptions, read_bytes};
+///
+/// let result = read_bytes("letter.doc".as_ref(), b"Dear Sir", &ReadOptions::default(), &());
+/// let Err(error) = result else { panic!("a letter has no points") };
+/// assert!(matches!(error, Error::UnknownFormat { .. }));
+/// assert!(error.to_string().starts_with("letter.doc: unknown format"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -88,6 +88,21 @@ impl PointCloud {
 
 /// A flat map that touches the ellipsoid at one place. It maps longitude and latitude to metres east and north of that
 /// place, and heights to metres.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{Crs, PointCloud, Unit, glam::DVec3};
+///
+/// let crs = Crs { unit: Some(Unit::Degree), ..Crs::default() };
+/// let places = vec![[0.0, 0.0, 0.0], [0.0, 0.001, 0.0]];
+/// let mut cloud = PointCloud::new(DVec3::new(10.0, 50.0, 300.0), places).with_crs(crs);
+/// let map = cloud.local_metres(None).ok_or("the cloud is not in degrees")?;
+/// cloud.to_metres_on(&map);
+/// let north = cloud.world_position(1).y - cloud.world_position(0).y;
+/// assert!((north - 111.2).abs() < 0.1, "a thousandth of a degree is {north} m");
+/// # Ok::<(), &str>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalMetres {
     middle: DVec3,

@@ -24,6 +24,18 @@ const SMALL: u64 = 64 << 20;
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] with `what` and `bytes`.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{available_memory, check_memory};
+///
+/// check_memory("a small picture", 640 * 480 * 4)?;
+/// if available_memory().is_some() {
+///     assert!(check_memory("all points of the world", u64::MAX).is_err());
+/// }
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 pub fn check_memory(what: &str, bytes: u64) -> Result<(), Error> {
     if bytes > SMALL && available_memory().is_some_and(|available| bytes > available) {
         return Err(Error::OutOfMemory { what: what.into(), bytes: usize::try_from(bytes).unwrap_or(usize::MAX) });

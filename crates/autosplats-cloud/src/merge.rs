@@ -26,6 +26,18 @@ impl PointCloud {
     /// * Residuals are kept if any part has some, and computed anew for parts that are moved.
     ///
     /// A single part without a pose is returned unchanged. Parts without points are ignored.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats_cloud::{PointCloud, glam::{DMat4, DVec3}};
+    ///
+    /// let cloud = |x| PointCloud::new(DVec3::ZERO, vec![[x, 0.0, 0.0]; 10]);
+    /// let pose = DMat4::from_translation(DVec3::new(0.0, 5.0, 0.0));
+    /// let both = PointCloud::merge(vec![(cloud(1.0), DMat4::IDENTITY), (cloud(2.0), pose)]);
+    /// assert_eq!(both.len(), 20);
+    /// assert_eq!(both.world_position(19), DVec3::new(2.0, 5.0, 0.0));
+    /// ```
     #[must_use]
     pub fn merge(parts: Vec<(Self, DMat4)>) -> Self {
         let (mut parts, empty): (Vec<_>, Vec<_>) = parts.into_iter().partition(|(cloud, _)| !cloud.is_empty());

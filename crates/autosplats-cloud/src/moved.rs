@@ -42,6 +42,17 @@ impl PointCloud {
     ///
     /// Rounding errors go to the residuals if the cloud has some; set [zeros](Self::with_residuals) first to keep all
     /// digits. For a cloud in degrees pass the map `local`; `matrix` then applies to metres on that map.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats_cloud::{PointCloud, glam::{DMat4, DVec3}};
+    ///
+    /// let mut cloud = PointCloud::new(DVec3::ZERO, vec![[1.0, 0.0, 0.0]; 2]);
+    /// cloud.move_points(|index| index == 1, &DMat4::from_translation(DVec3::Z), None);
+    /// assert_eq!(cloud.world_position(0), DVec3::new(1.0, 0.0, 0.0));
+    /// assert_eq!(cloud.world_position(1), DVec3::new(1.0, 0.0, 1.0));
+    /// ```
     pub fn move_points(&mut self, which: impl Fn(usize) -> bool + Sync, matrix: &DMat4, local: Option<&LocalMetres>) {
         let moved = |place: DVec3| match local {
             None => matrix.transform_point3(place),

@@ -5,6 +5,39 @@ use crate::{Error, PointCloud};
 /// Receives the progress and the notes of reading or writing, and may cancel the work.
 ///
 /// `()` implements the trait: it reports nothing and never cancels.
+///
+/// # Examples
+///
+/// ```
+/// use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+///
+/// use autosplats_cloud::{Error, Progress, ReadOptions, read_bytes};
+///
+/// struct Terminal {
+///     stop: AtomicBool,
+/// }
+///
+/// impl Progress for Terminal {
+///     fn report(&self, fraction: f32) {
+///         eprint!("\r{:3.0} %", 100.0 * fraction);
+///     }
+///
+///     fn cancelled(&self) -> bool {
+///         self.stop.load(Relaxed)
+///     }
+///
+///     fn note(&self, note: &str) {
+///         eprintln!("note: {note}");
+///     }
+/// }
+///
+/// let terminal = Terminal { stop: AtomicBool::new(false) };
+/// let read = || read_bytes("a.xyz".as_ref(), b"1 2 3\n", &ReadOptions::default(), &terminal);
+/// assert_eq!(read()?.len(), 1);
+/// terminal.stop.store(true, Relaxed);
+/// assert!(matches!(read(), Err(Error::Cancelled)));
+/// # Ok::<(), Error>(())
+/// ```
 pub trait Progress: Sync {
     /// Called now and then with the finished fraction of the work, 0 to 1, which never falls.
     fn report(&self, fraction: f32);

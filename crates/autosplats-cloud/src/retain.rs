@@ -6,6 +6,17 @@ use crate::{PointCloud, cloud::each_type, identity::Identity};
 
 impl PointCloud {
     /// Keeps the points for which `keep`, called with their index, is true. Order and attributes are kept.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats_cloud::{PointCloud, glam::DVec3};
+    ///
+    /// let mut cloud = PointCloud::new(DVec3::ZERO, vec![[0.0, 0.0, 1.0], [0.0, 0.0, 3.0]]);
+    /// let high: Vec<bool> = (0..cloud.len()).map(|i| cloud.world_position(i).z > 2.0).collect();
+    /// cloud.retain(|i| high[i]);
+    /// assert_eq!(cloud.positions(), [[0.0, 0.0, 3.0]]);
+    /// ```
     pub fn retain(&mut self, keep: impl Fn(usize) -> bool + Sync + Send) {
         let keep: Vec<bool> = (0..self.len()).into_par_iter().map(keep).collect();
         if keep.iter().all(|&keep| keep) {

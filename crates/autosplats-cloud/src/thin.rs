@@ -10,6 +10,17 @@ const BLOCK: usize = 1 << 20;
 
 impl PointCloud {
     /// Keeps the points inside a box of world coordinates, faces included. Points without a finite position go.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats_cloud::{PointCloud, glam::DVec3};
+    ///
+    /// let line = (0..10).map(|x| [x as f32, 0.0, 0.0]).collect();
+    /// let mut cloud = PointCloud::new(DVec3::ZERO, line);
+    /// cloud.crop(DVec3::ZERO, DVec3::new(3.5, 1.0, 1.0));
+    /// assert_eq!(cloud.len(), 4);
+    /// ```
     pub fn crop(&mut self, min: DVec3, max: DVec3) {
         let inside: Vec<bool> = (0..self.len())
             .into_par_iter()
@@ -37,6 +48,18 @@ impl PointCloud {
     /// # Errors
     /// [`Error::BadValue`] if `size` is not above zero, or so small that cube indices overflow; [`Error::Cancelled`] if
     /// `progress` says so.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats_cloud::{PointCloud, glam::DVec3};
+    ///
+    /// let line = (0..40).map(|i| [0.25 * i as f32, 0.0, 0.0]).collect();
+    /// let mut cloud = PointCloud::new(DVec3::ZERO, line);
+    /// cloud.thin_by_voxel(1.0, &())?;
+    /// assert_eq!(cloud.len(), 10);
+    /// # Ok::<(), autosplats_cloud::Error>(())
+    /// ```
     pub fn thin_by_voxel(&mut self, size: f64, progress: &dyn Progress) -> Result<(), Error> {
         if !(size > 0.0 && size.is_finite()) {
             return Err(Error::BadValue { name: "voxel size", value: size, rule: "above 0" });

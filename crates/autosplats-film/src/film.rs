@@ -20,6 +20,23 @@ pub fn has_ffmpeg() -> bool {
 
 /// A film in the making. The file appears when the film is [finished](Self::finish). A dropped film leaves nothing
 /// behind.
+///
+/// # Examples
+///
+/// ```no_run
+/// use autosplats::Image;
+/// use autosplats_film::{Film, has_ffmpeg};
+///
+/// if has_ffmpeg() {
+///     let mut film = Film::begin("fade.mp4".as_ref(), [64, 48], 25.0)?;
+///     for shade in 0..=255 {
+///         let pixels = vec![[shade, shade, shade, 255]; 64 * 48];
+///         film.add(&Image { width: 64, height: 48, pixels, ..Image::default() })?;
+///     }
+///     film.finish()?;
+/// }
+/// # Ok::<(), autosplats_film::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Film {
     path: PathBuf,

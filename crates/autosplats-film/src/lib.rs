@@ -25,6 +25,15 @@ pub use target::{Frames, Target, has_number};
 use std::path::PathBuf;
 
 /// Errors of making pictures and films.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_film::Target;
+///
+/// let Err(error) = Target::new("turn.gif".as_ref()) else { panic!("a GIF is no film") };
+/// assert!(error.to_string().starts_with("turn.gif: "));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -10,6 +10,20 @@ const MAX_DIGITS: usize = 12;
 const DIGITS: usize = 5;
 
 /// Target of successive pictures.
+///
+/// # Examples
+///
+/// ```
+/// use std::path::PathBuf;
+///
+/// use autosplats_film::{Error, Target};
+///
+/// let Target::Frames(frames) = Target::new("turn_%03d.png".as_ref())? else { panic!("no film") };
+/// assert_eq!(frames.file(7), PathBuf::from("turn_007.png"));
+/// assert_eq!(Target::new("turn.mp4".as_ref())?, Target::Film("turn.mp4".into()));
+/// assert!(matches!(Target::new("turn.gif".as_ref()), Err(Error::Name { .. })));
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Target {
     /// A PNG file per picture.
@@ -19,6 +33,18 @@ pub enum Target {
 }
 
 /// Names of numbered files.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_film::Target;
+///
+/// let target = Target::new("frames/turn_%03d.png".as_ref())?;
+/// let Target::Frames(frames) = target else { panic!("no film") };
+/// assert!(frames.file(12).ends_with("turn_012.png"));
+/// assert!(frames.pattern().ends_with("turn_….png"));
+/// # Ok::<(), autosplats_film::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frames {
     folder: PathBuf,
@@ -59,6 +85,20 @@ impl Target {
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use std::path::PathBuf;
+    ///
+    /// use autosplats_film::Target;
+    ///
+    /// let Target::Frames(one) = Target::one("scan.png".as_ref())? else { panic!("no film") };
+    /// assert_eq!(one.file(0), PathBuf::from("scan.png"));
+    /// let Target::Frames(many) = Target::new("scan.png".as_ref())? else { panic!("no film") };
+    /// assert_eq!(many.file(0), PathBuf::from("scan_00000.png"));
+    /// # Ok::<(), autosplats_film::Error>(())
+    /// ```
     pub fn one(path: &Path) -> Result<Self, Error> {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         Ok(match Self::new(path)? {
@@ -70,6 +110,20 @@ impl Target {
     }
 
     /// The first existing file that this many pictures, numbered from 0, would replace.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats_film::Target;
+    ///
+    /// # let folder = tempfile::tempdir()?;
+    /// # let folder = folder.path();
+    /// let target = Target::new(&folder.join("turn_%02d.png"))?;
+    /// assert_eq!(target.existing(100), None);
+    /// std::fs::write(folder.join("turn_03.png"), "")?;
+    /// assert_eq!(target.existing(100), Some(folder.join("turn_03.png")));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn existing(&self, pictures: usize) -> Option<PathBuf> {
         match self {
             Self::Film(path) => Some(path.clone()).filter(|path| path.exists()),
@@ -96,6 +150,15 @@ impl Frames {
 }
 
 /// Whether a file name has a place for a number, as in `f_%05d.png`.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_film::has_number;
+///
+/// assert!(has_number("turn_%05d.png"));
+/// assert!(!has_number("50%.png"));
+/// ```
 pub fn has_number(name: &str) -> bool {
     number(name).is_some()
 }

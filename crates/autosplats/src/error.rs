@@ -4,6 +4,18 @@
 pub const MAX_SIDE: u32 = 16_384;
 
 /// Error of rendering or of normal estimation.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{Error, Settings};
+///
+/// let mut settings = Settings::default();
+/// settings.reconstruction.k = 100;
+/// let Err(error) = settings.check() else { panic!("k is at most 64") };
+/// assert!(matches!(error, Error::Setting { name: "k", .. }));
+/// assert_eq!(error.to_string(), "k is 100, must be within 1 to 64");
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -54,3 +54,8 @@ pub use search::SearchEngine;
 pub use shade::{Background, Backs, ColorMap, ColorMode, Image, Shading};
 pub use splat::{GBuffer, TILE};
 pub use wgpu;
+
+/// Compiles the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

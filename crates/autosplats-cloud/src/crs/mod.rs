@@ -4,6 +4,17 @@ pub(crate) mod geotiff;
 mod wkt;
 
 /// The coordinate system that a file states. Readers do not convert coordinates.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{Crs, Unit};
+///
+/// let text = r#"PROJCS["WGS 84 / UTM zone 32N",UNIT["metre",1],AUTHORITY["EPSG","32632"]]"#;
+/// let crs = Crs::from_wkt(text);
+/// assert_eq!(crs.name.as_deref(), Some("WGS 84 / UTM zone 32N"));
+/// assert_eq!((crs.epsg, crs.unit), (Some(32_632), Some(Unit::Metre)));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Crs {
     /// Name for people.

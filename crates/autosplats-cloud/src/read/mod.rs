@@ -89,6 +89,14 @@ const FORMATS: &[&Format] = &[
 const MODELS: &[&Format] = &[&gltf::FORMAT, &off::FORMAT, &obj::FORMAT, &stl::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::formats;
+///
+/// assert!(formats().any(|(_, extensions)| extensions.contains(&"e57")));
+/// ```
 pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
     FORMATS.iter().map(|format| (format.name, format.extensions))
 }
@@ -122,6 +130,19 @@ impl From<PointCloud> for Contents {
 /// # Errors
 /// [`Error::Io`] if the file cannot be read; [`Error::UnknownFormat`], [`Error::Malformed`] and [`Error::Unsupported`]
 /// for its content; [`Error::OutOfMemory`]; and [`Error::Cancelled`] if `progress` says so.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{glam::DVec3, read};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("scan.xyz");
+/// std::fs::write(&path, "1 2 3\n4 5 6\n")?;
+/// let cloud = read(&path, &())?;
+/// assert_eq!(cloud.world_position(1), DVec3::new(4.0, 5.0, 6.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<PointCloud, Error> {
     read_with(path, &ReadOptions::default(), progress)
 }
@@ -139,6 +160,18 @@ pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Progress) ->
 ///
 /// # Errors
 /// Those of [`read`].
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{ReadOptions, read_bytes};
+///
+/// let text = b"x,y,z,Intensity\n512000.5,5400000.25,310.0,7\n";
+/// let cloud = read_bytes("survey.csv".as_ref(), text, &ReadOptions::default(), &())?;
+/// assert_eq!(cloud.world_position(0).y, 5_400_000.25);
+/// assert_eq!(cloud.fields()[0].name, "Intensity");
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 pub fn read_bytes(
     name: &Path,
     bytes: &[u8],
@@ -161,6 +194,18 @@ pub fn read_mesh(path: &Path, options: &ReadOptions, progress: &dyn Progress) ->
 ///
 /// # Errors
 /// Those of [`read`].
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{ReadOptions, read_mesh_bytes};
+///
+/// let text = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+/// let mesh = read_mesh_bytes("square.obj".as_ref(), text, &ReadOptions::default(), &())?;
+/// assert_eq!(mesh.cloud.len(), 4);
+/// assert_eq!(mesh.triangles.len(), 2);
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 pub fn read_mesh_bytes(
     name: &Path,
     bytes: &[u8],
@@ -201,6 +246,19 @@ pub fn describe(path: &Path, options: &ReadOptions) -> Result<Description, Error
 ///
 /// # Errors
 /// Those of [`describe`].
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{ReadOptions, describe_bytes};
+///
+/// let text = b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n\
+///     property float y\nproperty float z\nend_header\n0 0 1\n1 0 1\n";
+/// let facts = describe_bytes("scan.ply".as_ref(), text, &ReadOptions::default())?;
+/// assert_eq!(facts.points, Some(2));
+/// assert_eq!(facts.attributes[2].name, "z");
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Description, Error> {
     let job = Job { path: name, progress: &(), bytes, options, triangles: false };
     (format(&job)?.describe)(&job)

@@ -45,6 +45,19 @@ const EXTRA_HALVINGS: i32 = 6;
 ///
 /// # Errors
 /// [`Error::NoSurface`] if no triangle has an area, [`Error::OutOfMemory`], [`Error::Cancelled`] if `progress` says so.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{ReadOptions, read_mesh_bytes, sample_surface};
+///
+/// let text = b"v 0 0 2\nv 1 0 2\nv 1 1 2\nv 0 1 2\nf 1 2 3 4\n";
+/// let mesh = read_mesh_bytes("square.obj".as_ref(), text, &ReadOptions::default(), &())?;
+/// let cloud = sample_surface(&mesh, 1000, 1, &())?;
+/// assert_eq!(cloud.len(), 1000);
+/// assert!(cloud.positions().iter().all(|[_, _, z]| *z == 2.0));
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 pub fn sample_surface(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<PointCloud, Error> {
     let sampled = SurfaceSamples::new(mesh, count, seed, progress)?.on(&mesh.cloud, progress)?;
     progress::tick(progress, 1.0)?;

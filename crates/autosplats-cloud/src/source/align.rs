@@ -8,6 +8,17 @@ use std::time::Duration;
 /// others. `None` for an input that overlaps with no other and starts with the clock.
 ///
 /// `spans` are the [clock spans](crate::Source::clock_span), in nanoseconds; `None` for inputs without a shared clock.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use autosplats_cloud::beginnings;
+///
+/// let seconds = |first: i64, last: i64| Some([first, last].map(|second| second * 1_000_000_000));
+/// let spans = [seconds(100, 110), seconds(105, 120), seconds(900, 950)];
+/// let [first, second] = [0, 5].map(Duration::from_secs);
+/// assert_eq!(beginnings(&spans), [Some(first), Some(second), None]);
+/// ```
 pub fn beginnings(spans: &[Option<[i64; 2]>]) -> Vec<Option<Duration>> {
     let mut order: Vec<(usize, [i64; 2])> =
         spans.iter().enumerate().filter_map(|(number, span)| Some((number, (*span)?))).collect();

@@ -68,6 +68,27 @@ pub struct LatestStatistics {
 /// Merges the updates of one or more streams, each with a pose, into the one cloud to show.
 ///
 /// Stamps are compared only within a sensor. After a seek or a replay, call [`restart`](Self::restart).
+///
+/// ```
+/// use std::{sync::Arc, time::Duration};
+///
+/// use autosplats_cloud::{
+///     Arrival, Latest, LatestOptions, PointCloud, Update, glam::{DMat4, DVec3},
+/// };
+///
+/// let update = |seconds: i64, count| {
+///     let cloud = Arc::new(PointCloud::new(DVec3::ZERO, vec![[0.0; 3]; count]));
+///     Update { channel: 0, stamp: seconds * 1_000_000_000, cloud }
+/// };
+/// let decay = Some(Duration::from_secs(2));
+/// let mut latest = Latest::new(LatestOptions { decay, ..LatestOptions::default() });
+/// let lidar = latest.add(DMat4::IDENTITY);
+/// latest.put(lidar, update(0, 10));
+/// latest.put(lidar, update(1, 20));
+/// assert_eq!(latest.cloud().len(), 30);
+/// assert_eq!(latest.put(lidar, update(3, 40)), Arrival::Shown);
+/// assert_eq!(latest.cloud().len(), 60);
+/// ```
 #[derive(Debug, Default)]
 pub struct Latest {
     options: LatestOptions,

@@ -45,6 +45,17 @@ const MOTION_FPS: f64 = 30.0;
 const FIRST_POINTS_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// An input of points.
+///
+/// ```
+/// use autosplats_cloud::{ReadOptions, Source};
+///
+/// let source = Source::parse("scene:figure:2K")?;
+/// assert_eq!(source.read(&ReadOptions::default(), &())?.len(), 2000);
+/// assert!(matches!(Source::parse("scan.laz")?, Source::File(_)));
+/// assert!(matches!(Source::parse("scans/frame_*.ply")?, Source::Sequence(_)));
+/// assert!(matches!(Source::parse("drive.mcap")?, Source::Recording(_)));
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub enum Source {
     /// A file of any of the [formats](crate::formats).
@@ -62,6 +73,20 @@ pub enum Source {
 }
 
 /// How [`Source::play`] plays a source. Options that do not apply to the kind of source are ignored, unless stated.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use autosplats_cloud::{LatestOptions, PlayOptions, ReadOptions, Source};
+///
+/// // Frames are 0.2 s apart: a decay of 0.3 s keeps the frame before.
+/// let latest = LatestOptions { decay: Some(Duration::from_millis(300)), ..Default::default() };
+/// let options = PlayOptions { fps: Some(5.0), latest, ..PlayOptions::default() };
+/// let source = Source::parse("scene:figure:2K")?;
+/// let mut player = source.play(&options, &ReadOptions::default(), &())?;
+/// assert_eq!(player.frame(3, &())?.len(), 4000);
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlayOptions {
     /// Frames per second: files of a sequence (default 10), or poses of an animated glTF or scene (default 30).

@@ -23,6 +23,25 @@ const MAX_STEPS_BACK: usize = 16;
 /// - With [`decay`](LatestOptions::decay), if frames cannot be read or channels have different rates. Decay counts from
 ///   the newest update of each channel.
 /// - If more than 16 frames of a channel in a row are unreadable. Only uninterrupted playback still shows its points.
+///
+/// ```
+/// use autosplats_cloud::{Animation, LatestOptions, Player, ReadOptions};
+///
+/// # use autosplats_cloud::{PointCloud, glam::DVec3, write};
+/// # let folder = tempfile::tempdir()?;
+/// # for (name, count) in [("frame_1.ply", 10), ("frame_2.ply", 20)] {
+/// #     let cloud = PointCloud::new(DVec3::ZERO, vec![[1.0; 3]; count]);
+/// #     write(&cloud, &folder.path().join(name), &())?;
+/// # }
+/// # let pattern = folder.path().join("frame_*.ply");
+/// # let pattern = pattern.to_string_lossy();
+/// // Two files, the first of 10 points and the second of 20.
+/// let animation = Animation::sequence(&pattern, 10.0, &ReadOptions::default(), &())?;
+/// let mut player = Player::new(Box::new(animation.play()), LatestOptions::default());
+/// assert_eq!(player.frame(1, &())?.len(), 20);
+/// assert_eq!(player.frame(0, &())?.len(), 10);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Player {
     stream: Box<dyn Stream>,
     options: LatestOptions,

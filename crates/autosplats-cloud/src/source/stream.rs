@@ -9,6 +9,46 @@ use crate::{Error, PointCloud, Progress};
 /// There are two kinds of streams. A stream with a [timeline](Self::timeline) knows all its frames, can seek to each of
 /// them, and gives the same points for a frame each time. A live stream gives updates as they arrive. Updates that
 /// nobody takes in time are replaced by newer ones and counted, unless the stream is set to keep all.
+///
+/// ```
+/// use std::{sync::Arc, time::Duration};
+///
+/// use autosplats_cloud::{
+///     Error, LatestOptions, Next, Player, PointCloud, Progress, Statistics, Stream, Timeline,
+///     Update, glam::DVec3,
+/// };
+///
+/// /// A sensor that sees one more point each time.
+/// #[derive(Default)]
+/// struct Sensor {
+///     count: usize,
+/// }
+///
+/// impl Stream for Sensor {
+///     fn timeline(&self) -> Option<&Timeline> {
+///         None
+///     }
+///
+///     fn seek(&mut self, _frame: usize) {}
+///
+///     fn next(&mut self, _patience: Duration, _progress: &dyn Progress) -> Result<Next, Error> {
+///         self.count += 1;
+///         let cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3]; self.count]);
+///         let stamp = self.count as i64;
+///         Ok(Next::Update(Update { channel: 0, stamp, cloud: Arc::new(cloud) }))
+///     }
+///
+///     fn statistics(&self) -> Statistics {
+///         Statistics { taken: self.count as u64, ..Statistics::default() }
+///     }
+/// }
+///
+/// let mut player = Player::new(Box::new(Sensor::default()), LatestOptions::default());
+/// player.next(Duration::ZERO, &())?;
+/// let cloud = player.next(Duration::ZERO, &())?;
+/// assert_eq!(cloud.map(|cloud| cloud.len()), Some(2));
+/// # Ok::<(), Error>(())
+/// ```
 pub trait Stream: Send {
     /// The times of all frames; `None` for a live stream.
     fn timeline(&self) -> Option<&Timeline>;
@@ -86,6 +126,17 @@ pub struct Statistics {
 }
 
 /// The times of a stream's frames, sorted.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use autosplats_cloud::Timeline;
+///
+/// let timeline = Timeline::even(4, 10.0)?;
+/// assert_eq!(timeline.duration(), Duration::from_millis(400));
+/// assert_eq!(timeline.frame_at(Duration::from_millis(250)), 2);
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Timeline {
     stamps: Vec<i64>,

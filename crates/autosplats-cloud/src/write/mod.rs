@@ -87,6 +87,19 @@ fn note_left_out(job: &Job<'_>, format: &str, others: &[(bool, &str)]) {
 /// # Errors
 /// [`Error::UnknownOutput`] if no format has the extension, [`Error::Io`] if the file cannot be written,
 /// [`Error::Unsupported`] if the format cannot hold such a cloud, and [`Error::Cancelled`] if `progress` says so.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{PointCloud, glam::DVec3, read, write};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("points.ply");
+/// let cloud = PointCloud::new(DVec3::ZERO, vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+/// write(&cloud, &path, &())?;
+/// assert_eq!(read(&path, &())?.positions(), cloud.positions());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result<(), Error> {
     let job = Job { cloud, path, progress };
     let format = format(path)?;
@@ -122,6 +135,15 @@ fn format(path: &Path) -> Result<&'static Format, Error> {
 ///
 /// # Errors
 /// [`Error::UnknownOutput`] if none has.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::check_writable;
+///
+/// assert!(check_writable("points.laz".as_ref()).is_ok());
+/// assert!(check_writable("points.doc".as_ref()).is_err());
+/// ```
 pub fn check_writable(path: &Path) -> Result<(), Error> {
     format(path).map(|_| ())
 }

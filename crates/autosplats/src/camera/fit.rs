@@ -102,6 +102,15 @@ pub(crate) fn up(axes: Axes) -> DVec3 {
 
 /// The axes that a cloud states, or else a guess. Clouds with an origin other than zero or a flat extent have Z up,
 /// others Y up.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{cloud::{Axes, PointCloud, glam::DVec3}, guess_axes};
+///
+/// let floor = (0..100).map(|i| [(i % 10) as f32, (i / 10) as f32, 0.0]).collect();
+/// assert_eq!(guess_axes(&PointCloud::new(DVec3::ZERO, floor)), Axes::ZUp);
+/// ```
 pub fn guess_axes(cloud: &PointCloud) -> Axes {
     cloud.axes().unwrap_or_else(|| {
         let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
@@ -123,6 +132,23 @@ impl Camera {
     ///
     /// # Errors
     /// [`Error::NothingVisible`] if the cloud has no finite point, [`Error::Camera`] if the projection is invalid.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats::{
+    ///     Camera, Projection, ViewDirection, cloud::{ReadOptions, Source}, guess_axes,
+    /// };
+    ///
+    /// let cloud = Source::parse("scene:figure:2K")?.read(&ReadOptions::default(), &())?;
+    /// let projection = Projection::PerspectiveFovDeg(40.0);
+    /// let axes = guess_axes(&cloud);
+    /// let camera = Camera::fit(&cloud, axes, ViewDirection::Front, 4.0 / 3.0, projection)?;
+    /// let lens = camera.lens([64, 48])?;
+    /// let (pixel, _) = lens.to_pixel(cloud.world_position(0)).ok_or("it is behind the eye")?;
+    /// assert!((0.0..64.0).contains(&pixel.x) && (0.0..48.0).contains(&pixel.y));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn fit(
         cloud: &PointCloud,
         axes: Axes,

@@ -12,6 +12,24 @@ use crate::Error;
 /// Pixel coordinates are those of the picture: (0, 0) is the outer corner of the top-left pixel, whose centre is at
 /// (0.5, 0.5). Depth is the distance in world units from the plane through the eye parallel to the picture, as in
 /// [`GBuffer`](crate::GBuffer).
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{Camera, Projection, cloud::glam::{DVec2, DVec3}};
+///
+/// let camera = Camera {
+///     eye: DVec3::new(0.0, -10.0, 0.0),
+///     look_at: DVec3::ZERO,
+///     up: DVec3::Z,
+///     projection: Projection::OrthographicHeight(48.0),
+/// };
+/// let lens = camera.lens([64, 48])?;
+/// assert_eq!(lens.pixel_size(10.0), 1.0);
+/// assert_eq!(lens.unproject(DVec2::new(33.0, 24.0), 10.0), DVec3::X);
+/// assert_eq!(lens.ray(DVec2::new(32.0, 24.0)), (camera.eye, DVec3::Y));
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
     pub(super) eye: DVec3,

@@ -19,6 +19,22 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 
 /// A camera in world coordinates.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{Camera, Projection, cloud::glam::{DVec2, DVec3}};
+///
+/// let camera = Camera {
+///     eye: DVec3::new(0.0, -10.0, 0.0),
+///     look_at: DVec3::ZERO,
+///     up: DVec3::Z,
+///     projection: Projection::PerspectiveFovDeg(40.0),
+/// };
+/// let middle = camera.to_pixel(DVec3::ZERO, [640, 480])?;
+/// assert_eq!(middle, Some((DVec2::new(320.0, 240.0), 10.0)));
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {

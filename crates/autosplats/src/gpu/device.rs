@@ -35,6 +35,14 @@ pub(crate) struct Gpu {
 }
 
 /// All devices that can render, hardware first.
+///
+/// # Examples
+///
+/// ```no_run
+/// for adapter in autosplats::adapters() {
+///     println!("{} ({}, {})", adapter.name, adapter.backend, adapter.kind);
+/// }
+/// ```
 pub fn adapters() -> Vec<AdapterSummary> {
     let summary = |adapter: &wgpu::Adapter| summary(adapter.get_info(), adapter.features(), &adapter.limits());
     usable_adapters().iter().map(summary).collect()

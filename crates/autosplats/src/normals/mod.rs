@@ -85,6 +85,28 @@ pub enum Orientation {
 }
 
 /// The position that a range of points was seen from.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{NormalSettings, Orientation, Viewpoint, estimate_normals};
+/// # use autosplats::cloud::{PointCloud, Scan, glam::{DMat4, DVec3}};
+/// # let floor = (0..100).map(|i| [(i % 10) as f32, (i / 10) as f32, 0.0]).collect();
+/// # let world_from_sensor = DMat4::from_translation(DVec3::new(5.0, 5.0, 2.0));
+/// # let scan = Scan { name: None, world_from_sensor, points: 0..100 };
+/// # let cloud = PointCloud::new(DVec3::ZERO, floor).with_scans(vec![scan]);
+///
+/// // The sensor stands above the floor that it scanned.
+/// let viewpoints = cloud.scans().iter().map(|scan| Viewpoint {
+///     position: scan.position(),
+///     points: scan.points.clone(),
+/// });
+/// let orientation = Orientation::Viewpoints(viewpoints.collect());
+/// let settings = NormalSettings { orientation, ..NormalSettings::default() };
+/// let normals = estimate_normals(&cloud, &settings, &())?;
+/// assert!(normals.normals.iter().all(|[_, _, z]| *z > 0.99));
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Viewpoint {
     /// World coordinates; finite, within 1e18 of the cloud's origin.
@@ -118,6 +140,22 @@ pub struct Normals {
 /// # Errors
 /// [`Error::Setting`] for a k or an orientation out of range, [`Error::TooManyPoints`], and [`Error::Cancelled`] if
 /// `progress` cancels.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{
+///     NormalSettings, Orientation, cloud::{PointCloud, glam::DVec3}, estimate_normals,
+/// };
+///
+/// let floor = (0..100).map(|i| [(i % 10) as f32, (i / 10) as f32, 0.0]).collect();
+/// let cloud = PointCloud::new(DVec3::ZERO, floor);
+/// let settings = NormalSettings { k: 8, orientation: Orientation::Direction(DVec3::Z) };
+/// let estimated = estimate_normals(&cloud, &settings, &())?;
+/// assert!(estimated.normals.iter().all(|[_, _, z]| *z > 0.99));
+/// assert!(estimated.curvature.iter().all(|curvature| *curvature < 1e-3));
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 pub fn estimate_normals(
     cloud: &PointCloud,
     settings: &NormalSettings,

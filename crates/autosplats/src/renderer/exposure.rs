@@ -16,6 +16,20 @@ const MAX_EXPOSURE: f32 = 8.0;
 
 /// Factor on a cloud's own colours if [`Shading::exposure`] is `None`. The factor is 1, or up to 8 if all colours are
 /// dark, as in a cellar scanned without a flash. Black points and clouds without colours are ignored.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{cloud::{PointCloud, glam::DVec3}, usual_exposure};
+///
+/// let of_grey = |grey| {
+///     let cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3]; 100]);
+///     Ok::<_, autosplats::cloud::Error>(usual_exposure(&cloud.with_colors(vec![[grey; 3]; 100])?))
+/// };
+/// assert_eq!(of_grey(220)?, 1.0);
+/// assert!(of_grey(60)? > 4.0);
+/// # Ok::<(), autosplats::cloud::Error>(())
+/// ```
 #[must_use]
 pub fn usual_exposure(cloud: &PointCloud) -> f32 {
     let Some(colors) = cloud.colors() else { return 1.0 };

@@ -34,6 +34,22 @@ pub struct RadiusTrial {
 ///
 /// # Errors
 /// Those of [`Renderer::render`]; [`Error::NothingVisible`] if no visible point has neighbours.
+///
+/// # Examples
+///
+/// ```no_run
+/// use autosplats::{Backend, Renderer, Settings, best_first_radius};
+/// # use autosplats::{Camera, Projection, cloud::{PointCloud, glam::DVec3}};
+/// # let cloud = PointCloud::new(DVec3::ZERO, Vec::new());
+/// # let (eye, projection) = (DVec3::X, Projection::PerspectiveFovDeg(40.0));
+/// # let camera = Camera { eye, look_at: DVec3::ZERO, up: DVec3::Z, projection };
+///
+/// let mut renderer = Renderer::with_backend(Backend::Gpu)?;
+/// let (size, settings) = ([1920, 1080], Settings::default());
+/// let best = best_first_radius(&mut renderer, &cloud, &camera, size, &settings, 0.99)?;
+/// println!("{} takes {} ms", best.first_radius, best.search_ms);
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 pub fn best_first_radius(
     renderer: &mut Renderer,
     cloud: &PointCloud,

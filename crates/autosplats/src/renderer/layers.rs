@@ -18,6 +18,33 @@ use super::Settings;
 /// # Errors
 /// [`Error::ImageSize`], [`Error::Camera`], [`Error::Setting`]; [`Error::Layers`] if a required layer does not have one
 /// value per pixel.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{
+///     Background, Camera, GBuffer, Projection, Shading, cloud::glam::DVec3, shade_layers,
+/// };
+///
+/// // A wall in the left half of the picture, 5 units from the eye.
+/// let mut layers = GBuffer::new(64, 48);
+/// for (x, y) in (0..32).flat_map(|x| (0..48).map(move |y| (x, y))) {
+///     let index = layers.index(x, y);
+///     layers.weight[index] = 1.0;
+///     layers.depth[index] = 5.0;
+///     layers.normal[index] = [0.0, 0.0, -1.0];
+/// }
+/// let camera = Camera {
+///     eye: DVec3::ZERO,
+///     look_at: DVec3::Y,
+///     up: DVec3::Z,
+///     projection: Projection::PerspectiveFovDeg(40.0),
+/// };
+/// let shading = Shading { background: Background::Transparent, ..Shading::default() };
+/// let image = shade_layers(&layers, &camera, &shading)?;
+/// assert_eq!([image.pixels[0][3], image.pixels[63][3]], [255, 0]);
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 pub fn shade_layers(layers: &GBuffer, camera: &Camera, shading: &Shading) -> Result<Image, Error> {
     let GBuffer { width, height, .. } = *layers;
     let sides = 1..=MAX_SIDE;

@@ -85,6 +85,16 @@ pub struct Timings {
 }
 
 /// Where frames are rendered. Pictures of the CPU and a GPU differ at most by a step of brightness in a few places.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{Backend, Renderer};
+///
+/// let renderer = Renderer::with_backend(Backend::Cpu)?;
+/// assert!(renderer.adapter().is_none());
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Backend {
@@ -98,6 +108,25 @@ pub enum Backend {
 }
 
 /// Renders clouds into pictures. A renderer keeps its buffers, so that frames after the first allocate very little.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{
+///     Camera, Projection, Renderer, Settings, ViewDirection, cloud::{ReadOptions, Source},
+///     guess_axes,
+/// };
+///
+/// let cloud = Source::parse("scene:figure:4K")?.read(&ReadOptions::default(), &())?;
+/// let (axes, projection) = (guess_axes(&cloud), Projection::PerspectiveFovDeg(40.0));
+/// let camera = Camera::fit(&cloud, axes, ViewDirection::Front, 4.0 / 3.0, projection)?;
+/// let mut renderer = Renderer::new();
+/// let frame = renderer.render(&cloud, &camera, [64, 48], &Settings::default())?;
+/// assert_eq!(frame.image.pixels.len(), 64 * 48);
+/// assert_eq!(frame.counts.points, 4000);
+/// assert!(frame.counts.covered > 100);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Renderer {
     form: BackendRenderer,
@@ -162,6 +191,22 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has; [`Error::DeviceMemory`].
+    ///
+    /// # Examples
+    ///
+    /// ```no_run
+    /// use autosplats::{Renderer, wgpu};
+    ///
+    /// # async fn renderer() -> Result<Renderer, Box<dyn std::error::Error>> {
+    /// let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    /// let adapter = instance.request_adapter(&wgpu::RequestAdapterOptions::default()).await?;
+    /// let required_limits = adapter.limits();
+    /// let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
+    /// let (device, queue) = adapter.request_device(&descriptor).await?;
+    /// let renderer = Renderer::with_device(device, queue)?;
+    /// # Ok(renderer)
+    /// # }
+    /// ```
     pub fn with_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
         Ok(Self { form: BackendRenderer::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?)) })
     }
@@ -211,6 +256,27 @@ impl Renderer {
     ///
     /// # Errors
     /// Those of [`render`](Self::render), and [`Error::Cancelled`] if `go_on` returned false.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+    ///
+    /// use autosplats::{Error, Renderer, Settings};
+    /// # use autosplats::{Camera, Projection, cloud::{PointCloud, glam::DVec3}};
+    /// # let floor = (0..10_000).map(|i| [(i % 100) as f32, (i / 100) as f32, 0.0]).collect();
+    /// # let cloud = PointCloud::new(DVec3::ZERO, floor);
+    /// # let (eye, look_at) = (DVec3::new(50.0, 50.0, 100.0), DVec3::new(50.0, 50.0, 0.0));
+    /// # let projection = Projection::PerspectiveFovDeg(40.0);
+    /// # let camera = Camera { eye, look_at, up: DVec3::Y, projection };
+    ///
+    /// let (mut renderer, settings) = (Renderer::new(), Settings::default());
+    /// // Another thread sets the flag when the user turns the view.
+    /// let turned = AtomicBool::new(true);
+    /// let go_on = || !turned.load(Relaxed);
+    /// let result = renderer.render_while(&cloud, &camera, [64, 48], &settings, &go_on);
+    /// assert!(matches!(result, Err(Error::Cancelled)));
+    /// ```
     pub fn render_while(
         &mut self,
         cloud: &PointCloud,
@@ -240,6 +306,24 @@ impl Renderer {
     /// # Errors
     /// Those of [`render`](Self::render); [`Error::Normals`] unless there is one of each per point; [`Error::Device`]
     /// if this renderer runs on a GPU.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats::{NormalSettings, Renderer, Settings, estimate_normals};
+    /// # use autosplats::{Camera, Projection, cloud::{PointCloud, glam::DVec3}};
+    /// # let floor = (0..10_000).map(|i| [(i % 100) as f32, (i / 100) as f32, 0.0]).collect();
+    /// # let cloud = PointCloud::new(DVec3::ZERO, floor);
+    /// # let (eye, look_at) = (DVec3::new(50.0, 50.0, 100.0), DVec3::new(50.0, 50.0, 0.0));
+    /// # let projection = Projection::PerspectiveFovDeg(40.0);
+    /// # let camera = Camera { eye, look_at, up: DVec3::Y, projection };
+    ///
+    /// let normals = estimate_normals(&cloud, &NormalSettings::default(), &())?;
+    /// let (mut renderer, settings) = (Renderer::new(), Settings::default());
+    /// let frame = renderer.render_with_normals(&cloud, &normals, &camera, [64, 48], &settings)?;
+    /// assert!(frame.counts.covered > 1000);
+    /// # Ok::<(), autosplats::Error>(())
+    /// ```
     pub fn render_with_normals(
         &mut self,
         cloud: &PointCloud,
@@ -269,6 +353,26 @@ impl Renderer {
     /// # Errors
     /// On a GPU, [`Error::DeviceMemory`], [`Error::DeviceLimit`] and [`Error::DeviceLost`], because the surfels are
     /// read back.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats::{Renderer, Settings};
+    /// # use autosplats::{Camera, Projection, cloud::{PointCloud, glam::DVec3}};
+    /// # let floor = (0..10_000).map(|i| [(i % 100) as f32, (i / 100) as f32, 0.0]).collect();
+    /// # let cloud = PointCloud::new(DVec3::ZERO, floor);
+    /// # let (eye, look_at) = (DVec3::new(50.0, 50.0, 100.0), DVec3::new(50.0, 50.0, 0.0));
+    /// # let projection = Projection::PerspectiveFovDeg(40.0);
+    /// # let camera = Camera { eye, look_at, up: DVec3::Y, projection };
+    ///
+    /// // The cloud is a floor, seen from above.
+    /// let mut renderer = Renderer::new();
+    /// renderer.render(&cloud, &camera, [64, 48], &Settings::default())?;
+    /// for surfel in renderer.surfels()? {
+    ///     assert!(surfel.normal[2] > 0.99, "point {} faces up", surfel.point);
+    /// }
+    /// # Ok::<(), autosplats::Error>(())
+    /// ```
     pub fn surfels(&mut self) -> Result<Vec<PointSurfel>, Error> {
         match &mut self.form {
             BackendRenderer::Cpu(renderer) => Ok(renderer.surfels()),
@@ -314,6 +418,23 @@ impl Renderer {
     /// # Errors
     /// Those of [`render`](Self::render); [`Error::Texture`] if the texture is unsuitable; [`Error::Device`] if this
     /// renderer runs on the CPU.
+    ///
+    /// # Examples
+    ///
+    /// ```no_run
+    /// use autosplats::{Error, Renderer, Settings, wgpu};
+    /// # use autosplats::{Camera, cloud::PointCloud};
+    ///
+    /// /// The texture has format `Rgba8Unorm` and usages `COPY_DST` and `TEXTURE_BINDING`.
+    /// fn draw(
+    ///     renderer: &mut Renderer,
+    ///     cloud: &PointCloud,
+    ///     camera: &Camera,
+    ///     texture: &wgpu::Texture,
+    /// ) -> Result<(), Error> {
+    ///     renderer.render_to_texture(cloud, camera, texture, &Settings::default())
+    /// }
+    /// ```
     pub fn render_to_texture(
         &mut self,
         cloud: &PointCloud,

@@ -17,6 +17,18 @@ const PICTURE_SIDE_PER_MARGIN: u32 = 12;
 const DOT_RADIUS_PER_PICTURE_SIDE: f32 = 0.0045;
 
 /// Settings of a picture: everything except the cloud, the camera and the size.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{ColorMode, Settings};
+///
+/// let mut settings = Settings::default();
+/// settings.reconstruction.k = 16;
+/// settings.shading.color = ColorMode::Height;
+/// settings.check()?;
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Settings {
@@ -31,6 +43,18 @@ pub struct Settings {
 /// How points become splats. Beyond [the paper's settings](Self::paper), the default turns on
 /// [`points_per_pixel`](Self::points_per_pixel), [`adaptive`](Self::adaptive), [`trim`](Self::trim) and
 /// [`coherent`](Self::coherent).
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{Reconstruction, Settings};
+///
+/// let reconstruction = Reconstruction { ellipses: true, ..Reconstruction::paper() };
+/// assert_eq!((reconstruction.k, reconstruction.points_per_pixel), (10, 1));
+/// let settings = Settings { reconstruction, ..Settings::default() };
+/// # settings.check()?;
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Reconstruction {

@@ -14,6 +14,26 @@ const MAX_SUPERSAMPLED_PIXELS: u64 = 1920 * 1080;
 /// down](crate::Image::averaged). The factor is 2 for up to 1920x1080 pixels if memory suffices, else 1.
 ///
 /// Supersampling takes two to four times as long. For pictures without noise it improves the accuracy most.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{Renderer, Settings, still_supersample};
+/// # use autosplats::{Camera, Projection, cloud::{PointCloud, glam::DVec3}};
+/// # let floor = (0..10_000).map(|i| [(i % 100) as f32, (i / 100) as f32, 0.0]).collect();
+/// # let cloud = PointCloud::new(DVec3::ZERO, floor);
+/// # let (eye, look_at) = (DVec3::new(50.0, 50.0, 100.0), DVec3::new(50.0, 50.0, 0.0));
+/// # let projection = Projection::PerspectiveFovDeg(40.0);
+/// # let camera = Camera { eye, look_at, up: DVec3::Y, projection };
+///
+/// let factor = still_supersample([64, 48]);
+/// let mut renderer = Renderer::new();
+/// let size = [64 * factor, 48 * factor];
+/// let frame = renderer.render(&cloud, &camera, size, &Settings::default())?;
+/// let image = frame.image.averaged(factor);
+/// assert_eq!([image.width, image.height], [64, 48]);
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 #[must_use]
 pub fn still_supersample(size: [u32; 2]) -> u32 {
     let [width, height] = size.map(|side| 2 * u64::from(side));

@@ -30,6 +30,16 @@ pub(crate) mod splat_communication;
 mod tests;
 
 /// An implementation of the k-radius search.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{Renderer, SearchEngine, Settings};
+///
+/// let mut settings = Settings::default();
+/// settings.reconstruction.engine = SearchEngine::SplatCommunication;
+/// assert!(Renderer::new().check(&settings).is_err(), "this engine needs a GPU");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

@@ -38,6 +38,17 @@ pub(crate) use cpu::{Scene, shade};
 pub use settings::{Background, Backs, ColorMap, ColorMode, Shading};
 
 /// An image, rows from the top.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::Image;
+///
+/// let pixels = [0, 255, 255, 0].map(|grey| [grey, grey, grey, 255]).to_vec();
+/// let image = Image { width: 2, height: 2, pixels, ..Image::default() };
+/// // The mean is one of light, which is brighter than that of the numbers.
+/// assert_eq!(image.averaged(2).pixels, [[188, 188, 188, 255]]);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Image {
     /// Width in pixels.

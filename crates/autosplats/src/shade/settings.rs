@@ -1,6 +1,31 @@
 //! Settings of shading.
 
 /// How splats become an image.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{Background, ColorMode, Renderer, Settings, Shading};
+/// # use autosplats::{Camera, Projection, cloud::{PointCloud, glam::DVec3}};
+/// # let floor = (0..10_000).map(|i| [(i % 100) as f32, (i / 100) as f32, 0.0]).collect();
+/// # let cloud = PointCloud::new(DVec3::ZERO, floor);
+/// # let (eye, look_at) = (DVec3::new(50.0, 50.0, 300.0), DVec3::new(50.0, 50.0, 0.0));
+/// # let projection = Projection::PerspectiveFovDeg(40.0);
+/// # let camera = Camera { eye, look_at, up: DVec3::Y, projection };
+///
+/// let shading = Shading {
+///     color: ColorMode::KRadius,
+///     range: Some([0.5, 2.0]),
+///     background: Background::Transparent,
+///     ..Shading::default()
+/// };
+/// let settings = Settings { shading, ..Settings::default() };
+/// let mut renderer = Renderer::new();
+/// let frame = renderer.render(&cloud, &camera, [64, 48], &settings)?;
+/// assert_eq!(frame.counts.value_range, Some([0.5, 2.0]));
+/// assert_eq!(frame.image.pixels[0], [0; 4]);
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Shading {
@@ -46,6 +71,16 @@ pub enum Backs {
 }
 
 /// Source of the surface's colour.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{ColorMap, ColorMode};
+///
+/// let mode = ColorMode::Field("Intensity".into());
+/// assert_eq!((mode.title().as_str(), mode.usual_map()), ("Intensity", Some(ColorMap::Gray)));
+/// assert_eq!(ColorMode::Rgb.usual_map(), None);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -98,6 +133,14 @@ impl ColorMode {
 }
 
 /// Colour map for values.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::ColorMap;
+///
+/// assert_eq!([0.0, 0.5, 1.0].map(|t| ColorMap::Gray.at(t)), [[0; 3], [128; 3], [255; 3]]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

@@ -43,6 +43,29 @@ pub(crate) const TILE_AREA: usize = TILE * TILE;
 /// Layers are stored tile by tile, [`TILE`]×[`TILE`] pixels each, so that a tile is one piece of cache and of work.
 /// [`index`](Self::index) finds a pixel of the picture. Layers may have a margin around the picture, whose pixels may
 /// be covered too. A layer that was not requested is empty.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::{Renderer, Settings, cloud::glam::DVec2};
+/// # use autosplats::{Camera, Projection, cloud::{PointCloud, glam::DVec3}};
+/// # let floor = (0..10_000).map(|i| [(i % 100) as f32, (i / 100) as f32, 0.0]).collect();
+/// # let cloud = PointCloud::new(DVec3::ZERO, floor);
+/// # let (eye, look_at) = (DVec3::new(50.0, 50.0, 100.0), DVec3::new(50.0, 50.0, 0.0));
+/// # let projection = Projection::PerspectiveFovDeg(40.0);
+/// # let camera = Camera { eye, look_at, up: DVec3::Y, projection };
+///
+/// // The cloud is a floor at height 0, seen from above.
+/// let (size, settings) = ([64, 48], Settings { all_layers: true, ..Settings::default() });
+/// let mut renderer = Renderer::new();
+/// let layers = renderer.render(&cloud, &camera, size, &settings)?.layers;
+/// let index = layers.index(20, 10);
+/// let pixel = DVec2::new(20.5, 10.5);
+/// let place = camera.unproject(pixel, layers.depth[index].into(), size)?;
+/// assert!(place.z.abs() < 0.01);
+/// assert!(layers.k_radius[index] > 1.0);
+/// # Ok::<(), autosplats::Error>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct GBuffer {
     /// Image width in pixels.

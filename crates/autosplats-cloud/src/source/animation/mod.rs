@@ -49,6 +49,21 @@ pub(crate) enum Surface {
 }
 
 /// A movement known at all times. A [`Playback`] plays it.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use autosplats_cloud::{Animation, Next, Scene, Stream as _};
+///
+/// let (scene, count) = Scene::parse("figure:2K")?;
+/// let animation = Animation::scene(&scene, count, 5.0)?;
+/// assert_eq!(animation.timeline().len(), 10);
+/// let mut playback = animation.play();
+/// playback.seek(4);
+/// let Next::Update(update) = playback.next(Duration::ZERO, &())? else { panic!("no frame 4") };
+/// assert_eq!((update.stamp, update.cloud.len()), (800_000_000, 2000));
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 #[derive(Clone)]
 pub struct Animation {
     frames: Arc<dyn Frames>,

@@ -22,6 +22,22 @@ use self::mailbox::Mailbox;
 use crate::{Error, Next, Progress, ReadOptions, Statistics, Stream, Timeline, error::message};
 
 /// Live points that others send or write: a [`Stream`] without a timeline that keeps only the newest update.
+///
+/// ```
+/// use std::{io::Cursor, time::Duration};
+///
+/// use autosplats_cloud::{Live, LiveOptions, Next, Stream as _};
+///
+/// let file = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n\
+///     property float y\nproperty float z\nend_header\n1 2 3\n";
+/// let options = LiveOptions { all: true, ..LiveOptions::default() };
+/// let mut live = Live::bytes(Cursor::new(file.repeat(3)), "pipe", &options)?;
+/// while let Next::Update(update) = live.next(Duration::from_secs(10), &())? {
+///     assert_eq!(update.cloud.positions(), [[1.0, 2.0, 3.0]]);
+/// }
+/// assert_eq!(live.statistics().taken, 3);
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 pub struct Live {
     mailbox: Arc<Mailbox>,
 }

@@ -1,5 +1,27 @@
 //! `sensor_msgs/PointCloud2`, the message of points in ROS 1 and ROS 2.
 //!
+//! ```
+//! use autosplats_cloud::{ReadOptions, glam::DVec3, point_cloud2::{Encoding, decode}};
+//!
+//! # let bytes = |number: &u32| number.to_le_bytes();
+//! # let numbers = |numbers: &[u32]| numbers.iter().flat_map(bytes).collect::<Vec<u8>>();
+//! # let text = |text: &str| [numbers(&[text.len() as u32]), text.as_bytes().to_vec()].concat();
+//! # let field = |name, offset| [text(name), numbers(&[offset]), vec![7], numbers(&[1])].concat();
+//! # let message = [
+//! #     [numbers(&[0, 1_700_000_000, 0]), text("lidar"), numbers(&[1, 1, 3])].concat(),
+//! #     [field("x", 0), field("y", 4), field("z", 8), vec![0], numbers(&[12, 12, 12])].concat(),
+//! #     [1_f32, 2.0, 3.0].map(f32::to_le_bytes).concat(),
+//! #     vec![1],
+//! # ];
+//! # let bytes = message.concat();
+//! let options = ReadOptions::default();
+//! // The bytes are those of a message with one point.
+//! let message = decode("/lidar/points".as_ref(), &bytes, Encoding::Ros1, &options)?;
+//! assert_eq!((message.frame_id.as_str(), message.stamp), ("lidar", 1_700_000_000_000_000_000));
+//! assert_eq!(message.cloud.world_position(0), DVec3::new(1.0, 2.0, 3.0));
+//! # Ok::<(), autosplats_cloud::Error>(())
+//! ```
+//!
 //! # How it works
 //!
 //! The message describes where each value of a point lies, so it is a table of columns like PLY and PCD. All its claims

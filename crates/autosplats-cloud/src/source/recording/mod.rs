@@ -52,6 +52,42 @@ pub struct RecordingOptions {
 ///
 /// The [timeline](crate::Stream::timeline) has the times of recording. Each [update](crate::Update) has the time of
 /// measurement if its message states one.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use autosplats_cloud::{Next, Recording, RecordingOptions, Stream as _};
+///
+/// # let bytes = |number: &u32| number.to_le_bytes();
+/// # let numbers = |numbers: &[u32]| numbers.iter().flat_map(bytes).collect::<Vec<u8>>();
+/// # let text = |text: &str| [numbers(&[text.len() as u32]), text.as_bytes().to_vec()].concat();
+/// # let field = |name, offset| [text(name), numbers(&[offset]), vec![7], numbers(&[1])].concat();
+/// # let message = [
+/// #     [numbers(&[0, 1_700_000_000, 0]), text("lidar"), numbers(&[1, 1, 3])].concat(),
+/// #     [field("x", 0), field("y", 4), field("z", 8), vec![0], numbers(&[12, 12, 12])].concat(),
+/// #     [1_f32, 2.0, 3.0].map(f32::to_le_bytes).concat(),
+/// #     vec![1],
+/// # ];
+/// # let options = mcap::WriteOptions::new().compression(None);
+/// # let mut writer = options.create(std::io::Cursor::new(Vec::new()))?;
+/// # let schema = writer.add_schema("sensor_msgs/PointCloud2", "ros1msg", b"")?;
+/// # let channel_id = writer.add_channel(schema, "/lidar/points", "ros1", &Default::default())?;
+/// # let time = 1_700_000_000_000_000_000;
+/// # let (sequence, log_time, publish_time) = (0, time, time);
+/// # let header = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time };
+/// # writer.write_to_known_channel(&header, &message.concat())?;
+/// # writer.finish()?;
+/// # let bytes = writer.into_inner().into_inner();
+/// let options = RecordingOptions::default();
+/// // The bytes are those of a recording with one message, which has one point.
+/// let mut recording = Recording::from_bytes("drive.mcap".as_ref(), bytes, &options, &())?;
+/// assert_eq!(recording.channels(), ["/lidar/points"]);
+/// while let Next::Update(update) = recording.next(Duration::ZERO, &())? {
+///     assert_eq!(update.cloud.positions(), [[1.0, 2.0, 3.0]]);
+/// }
+/// assert_eq!(recording.statistics().taken, 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Recording {
     files: Vec<File>,
     options: RecordingOptions,

@@ -1,5 +1,20 @@
 //! Live points of ROS 2 over Zenoh, from nodes with rmw_zenoh or behind the bridge from DDS.
 //!
+//! ```no_run
+//! use std::time::Duration;
+//!
+//! use autosplats_cloud::{Next, Stream as _, remote::{Remote, RemoteOptions, topics}};
+//!
+//! for topic in topics("zenoh://robot", Duration::from_secs(5))? {
+//!     println!("{}, {}", topic.name, topic.kind);
+//! }
+//! let mut points = Remote::open("zenoh://robot/lidar/points", &RemoteOptions::default())?;
+//! while let Next::Update(update) = points.next(Duration::from_secs(1), &())? {
+//!     println!("{} points", update.cloud.len());
+//! }
+//! # Ok::<(), autosplats_cloud::Error>(())
+//! ```
+//!
 //! # How it works
 //!
 //! A [`Remote`] subscribes to a topic under both of its possible keys. Zenoh's threads store only the newest message of

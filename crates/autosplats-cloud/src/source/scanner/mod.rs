@@ -35,6 +35,22 @@ const MAX_RAYS: u64 = 1 << 28;
 const BYTES_PER_RAY: u64 = 64;
 
 /// A simulated scanner. Lengths are in the unit of the surface it scans.
+///
+/// ```
+/// use autosplats_cloud::{
+///     Animation, LatestOptions, Player, ReadOptions, Scanner, read_mesh_bytes,
+/// };
+///
+/// let text = b"v -1 -1 2\nv 1 -1 2\nv 1 1 2\nv -1 1 2\nf 1 2 3 4\n";
+/// let wall = read_mesh_bytes("wall.obj".as_ref(), text, &ReadOptions::default(), &())?;
+/// // At the origin, looking along z.
+/// let scanner = Scanner { columns: 64, rows: 48, ..Scanner::default() };
+/// let scanned = Animation::still(wall).scanned(vec![scanner], 1)?;
+/// let mut player = Player::new(Box::new(scanned.play()), LatestOptions::default());
+/// let cloud = player.frame(0, &())?;
+/// assert!(cloud.len() > 1000 && cloud.positions().iter().all(|[_, _, z]| (z - 2.0).abs() < 1e-5));
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scanner {
     /// Pose: maps the scanner's frame (x right, y down, z forward) to world coordinates. A rotation and a translation.

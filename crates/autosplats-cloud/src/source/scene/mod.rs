@@ -37,6 +37,19 @@ use crate::{Axes, Error, PointCloud};
 /// A generated scene: a closed surface, known exactly, at one moment of its animation. In metres, z up.
 ///
 /// Animations repeat every [`Scene::PERIOD`] seconds.
+///
+/// ```
+/// use autosplats_cloud::Scene;
+///
+/// let (scene, count) = Scene::parse("figure:2K@0.5")?;
+/// let cloud = scene.sample(count, &|_| true)?;
+/// assert_eq!((scene.name(), cloud.len()), ("figure", 2000));
+/// assert!(scene.distance(cloud.world_position(0)).abs() < 1e-3);
+/// let view = scene.view();
+/// let hit = scene.trace(view.eye, view.look_at - view.eye);
+/// assert!(hit.is_some_and(|hit| hit.distance > 1.0));
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scene {
     kind: Kind,

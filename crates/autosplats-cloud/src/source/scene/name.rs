@@ -96,6 +96,13 @@ fn known() -> String {
 }
 
 /// Parses a number of points: `1000`, `546K`, `1.5M`, `1g`. `None` if the text is not a number from 1 to 1G.
+///
+/// ```
+/// use autosplats_cloud::parse_count;
+///
+/// assert_eq!(parse_count("1.5M"), Some(1_500_000));
+/// assert_eq!(parse_count("many"), None);
+/// ```
 pub fn parse_count(text: &str) -> Option<usize> {
     let text = text.trim();
     let (number, unit) = match text.char_indices().last()? {
