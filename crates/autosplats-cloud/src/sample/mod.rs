@@ -12,13 +12,13 @@
 //! The centroid of a part of a triangle has a closed form. Halves before a position on the curve add their centroids,
 //! weighted by area. Only the half that contains the position is subdivided.
 
-mod strewn;
+mod surface_samples;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use self::strewn::Place;
-pub(crate) use self::strewn::SurfaceSamples;
+use self::surface_samples::Place;
+pub(crate) use self::surface_samples::SurfaceSamples;
 use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, progress, random::Random};
 
 /// Points computed between two checks for cancellation.
