@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::pass::CompiledPasses;
 use crate::Error;
 
 /// A device that can render.
@@ -32,6 +33,8 @@ pub(crate) struct Gpu {
     pub(crate) queue: wgpu::Queue,
     /// Why the device was lost; `None` while it works.
     lost: Arc<Mutex<Option<String>>>,
+    /// Passes compiled so far, for all clones: a change of size or colour mode asks for most of them again.
+    pub(super) compiled: Arc<Mutex<CompiledPasses>>,
 }
 
 /// All devices that can render, hardware first.
@@ -135,7 +138,7 @@ impl Gpu {
     /// Takes the caller's device and leaves its callback for loss alone; a loss is noticed when the device does not
     /// answer.
     pub(crate) fn from_parts(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        Self { device, queue, lost: Arc::default() }
+        Self { device, queue, lost: Arc::default(), compiled: Arc::default() }
     }
 
     /// Description of the device.

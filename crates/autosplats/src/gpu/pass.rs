@@ -1,6 +1,8 @@
 //! A pass: one WGSL file made into a compute pipeline. Passes that draw are in `raster.rs`.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
+use std::sync::PoisonError;
 
 use wgpu::naga;
 
@@ -45,8 +47,19 @@ impl PassSource {
     }
 }
 
+/// The compute passes that a device has compiled. Constants are settings with few values, so their number is bounded.
+pub(super) type CompiledPasses = HashMap<PassKey, Pass>;
+
+/// What a pass is compiled from. Sources are static, so their address tells them apart.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) struct PassKey {
+    path: &'static str,
+    source: usize,
+    constants: Vec<(String, u64)>,
+}
+
 /// A compute pipeline with the layout of its bindings.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Pass {
     path: &'static str,
     label: String,
@@ -60,6 +73,23 @@ impl Pass {
     /// # Errors
     /// [`Error::Device`] if the device lacks a feature or refuses the shader.
     pub(crate) fn new(gpu: &Gpu, source: &PassSource, constants: &[(&str, f64)]) -> Result<Self, Error> {
+        let constant = |&(name, value): &(&str, f64)| (name.to_owned(), value.to_bits());
+        let key = PassKey {
+            source: source.source.as_ptr().addr(),
+            path: source.path,
+            constants: constants.iter().map(constant).collect(),
+        };
+        let lock = || gpu.compiled.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pass) = lock().get(&key) {
+            gpu.check_lost()?;
+            return Ok(pass.clone());
+        }
+        let pass = Self::compile(gpu, source, constants)?;
+        lock().insert(key, pass.clone());
+        Ok(pass)
+    }
+
+    fn compile(gpu: &Gpu, source: &PassSource, constants: &[(&str, f64)]) -> Result<Self, Error> {
         let LinkedSource { label, module, entries } = LinkedSource::new(gpu, source, wgpu::ShaderStages::COMPUTE)?;
         gpu.checked(|| {
             let made = PipelineParts::new(gpu, &label, module, &entries);
@@ -220,4 +250,26 @@ fn layout_entries(module: &naga::Module, visibility: wgpu::ShaderStages) -> Vec<
         .collect();
     entries.sort_by_key(|entry| entry.binding);
     entries
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_gpu;
+    use super::*;
+
+    #[test]
+    fn a_pass_is_compiled_once_for_each_set_of_constants() {
+        const CODE: &str = "override STEP: u32 = 1u;\n@group(0) @binding(0) var<storage, read_write> x: array<u32>;\n\
+                            @compute @workgroup_size(1) fn count() { x[0] += STEP; }";
+        const OTHER: &str = "@group(0) @binding(0) var<storage, read_write> x: array<u32>;\n\
+                             @compute @workgroup_size(1) fn count() { x[0] += 3u; }";
+        let Some(gpu) = test_gpu() else { return };
+        let pass = |code, constants: &[(&str, f64)]| {
+            Pass::new(&gpu, &PassSource::new("count", code), constants).expect("a pass").pipeline
+        };
+        let first = pass(CODE, &[("STEP", 1.0)]);
+        assert_eq!(first, pass(CODE, &[("STEP", 1.0)]), "the same pass");
+        assert_ne!(first, pass(CODE, &[("STEP", 2.0)]), "another constant");
+        assert_ne!(first, pass(OTHER, &[]), "another source of the same name");
+    }
 }

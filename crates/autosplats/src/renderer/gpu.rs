@@ -64,6 +64,11 @@ struct Resident {
 }
 
 impl GpuRenderer {
+    /// The device, with the passes that it has compiled.
+    pub(super) fn device(&self) -> &Gpu {
+        &self.gpu
+    }
+
     /// Creates a renderer on `gpu`.
     ///
     /// # Errors

@@ -211,6 +211,29 @@ impl Renderer {
         Ok(Self { form: BackendRenderer::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?)) })
     }
 
+    /// Creates another renderer in the same place: on the CPU, or on the same device. On a device the two share what is
+    /// compiled, so the second one starts sooner; each keeps its own points and buffers.
+    ///
+    /// # Errors
+    /// [`Error::DeviceMemory`], [`Error::DeviceLost`].
+    ///
+    /// ```
+    /// use autosplats::Renderer;
+    ///
+    /// let front = Renderer::new();
+    /// let top = front.another()?;
+    /// assert!(top.adapter().is_none(), "on the CPU, as the first one");
+    /// # Ok::<(), autosplats::Error>(())
+    /// ```
+    pub fn another(&self) -> Result<Self, Error> {
+        match &self.form {
+            BackendRenderer::Cpu(_) => Ok(Self::new()),
+            BackendRenderer::Gpu(renderer) => {
+                Ok(Self { form: BackendRenderer::Gpu(Box::new(GpuRenderer::new(renderer.device().clone())?)) })
+            }
+        }
+    }
+
     /// The device that renders; `None` on the CPU.
     pub fn adapter(&self) -> Option<AdapterSummary> {
         match &self.form {

@@ -21,17 +21,6 @@ const SIZE: [u32; 2] = [480, 300];
 /// last place, which moves a few points in ten thousand to the next pixel.
 const MAX_DIFFERENT_SHARE: f64 = 1e-3;
 
-fn gpu() -> Option<Renderer> {
-    match Renderer::with_backend(Backend::Gpu) {
-        Ok(renderer) => Some(renderer),
-        Err(error) => {
-            assert!(std::env::var_os("CI").is_none(), "{error}");
-            eprintln!("nothing checked: {error}");
-            None
-        }
-    }
-}
-
 /// Settings with one point per pixel, as on small devices and in splat communication.
 fn a_point_a_pixel() -> Settings {
     let reconstruction = Reconstruction { points_per_pixel: 1, ..Reconstruction::default() };
@@ -129,7 +118,7 @@ fn comparison_sees_another_picture() {
 
 #[test]
 fn every_scene() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     for (name, _) in Scene::names() {
         for count in [3_000, 150_000] {
             let (cloud, camera) = scene(name, count);
@@ -140,7 +129,7 @@ fn every_scene() {
 
 #[test]
 fn depth_cameras_and_what_comes_after() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let positions = crate::test_clouds::room(240, |depth| crate::test_clouds::stepped(depth, 0.0029));
     let scan = |points: std::ops::Range<usize>| Scan { name: None, world_from_sensor: DMat4::IDENTITY, points };
     let half = positions.len() / 2;
@@ -166,7 +155,7 @@ fn depth_cameras_and_what_comes_after() {
 
 #[test]
 fn every_test_cloud_with_both_projections() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     // Layers without adaptation. In clumps, which are no surface, rounding decides between two fits shared by all
     // splats around. The layers then differ, though the picture does not.
     let fixed = Reconstruction { adaptive: false, ..Reconstruction::default() };
@@ -187,7 +176,7 @@ fn every_test_cloud_with_both_projections() {
 
 #[test]
 fn every_setting() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let (cloud, camera) = scene("cathedral", 60_000);
     let usual = Reconstruction::default;
     let cases = [
@@ -213,7 +202,7 @@ fn every_setting() {
 
 #[test]
 fn whole_splats() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let (cloud, camera) = scene("statue", 60_000);
     let mut covered = |trim: bool| {
         let reconstruction = Reconstruction { trim, ..Reconstruction::default() };
@@ -234,7 +223,7 @@ fn noisy_scene(name: &str, count: usize, sigma: f32) -> (PointCloud, Camera) {
 
 #[test]
 fn adapted_to_noise() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     for (name, count, sigma) in
         [("statue", 60_000, 0.0), ("statue", 60_000, 0.01), ("cathedral", 60_000, 0.02), ("figure", 150_000, 0.01)]
     {
@@ -275,7 +264,7 @@ fn adapted_or_not_is_seen_by_the_comparison() {
 
 #[test]
 fn every_colour() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let (cloud, camera) = scene("figure", 40_000);
     let values = (0..cloud.len()).map(|i| if i % 7 == 0 { f32::NAN } else { (i % 1000) as f32 }).collect();
     let classes = (0..cloud.len()).map(|i| (i * 8 / cloud.len()) as u8).collect();
@@ -316,7 +305,7 @@ fn every_colour() {
 
 #[test]
 fn the_same_frame_twice_is_the_same_to_the_byte() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let settings = Settings { all_layers: true, ..Settings::default() };
     let (cloud, camera) = scene("herd", 200_000);
     let (other, _) = scene("statue", 50_000);
@@ -345,7 +334,7 @@ fn the_frames_before_leave_no_trace() {
         (&cloud, step(0.31), [SIZE[0] / 2, SIZE[1]]),
         (&cloud, step(0.31), SIZE),
     ];
-    let renderers = [10, 17].into_iter().flat_map(|k| [(Some(Renderer::new()), k), (gpu(), k)]);
+    let renderers = [10, 17].into_iter().flat_map(|k| [(Some(Renderer::new()), k), (crate::gpu(), k)]);
     for (mut renderer, k) in renderers.filter_map(|(renderer, k)| Some((renderer?, k))) {
         let reconstruction = Reconstruction { k, ..Reconstruction::default() };
         let settings = Settings { reconstruction, all_layers: true, ..Settings::default() };
@@ -368,7 +357,7 @@ fn the_frames_before_leave_no_trace() {
 
 #[test]
 fn nothing_to_see_is_no_trouble() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let camera =
         Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::NEG_Y, projection: Projection::PerspectiveFovDeg(36.0) };
     let settings = Settings { all_layers: true, ..Settings::default() };
@@ -428,14 +417,14 @@ fn a_handful_of_points_is_dots() {
         *cpu.render(&nowhere, &camera, SIZE, &settings).expect("a picture").image == picture,
         "points that are nowhere"
     );
-    if let Some(mut gpu) = gpu() {
+    if let Some(mut gpu) = crate::gpu() {
         compare(&mut gpu, &cloud, &camera, SIZE, &settings, "a handful");
     }
 }
 
 #[test]
 fn a_picture_of_8192_pixels_a_side() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let (cloud, camera) = scene("figure", 20_000);
     let most = gpu.adapter().expect("a device").points_per_binding * 12;
     let enough = most >= 8192 * 8192 * 16;
@@ -449,7 +438,7 @@ fn a_picture_of_8192_pixels_a_side() {
 
 #[test]
 fn colours_come_and_go_without_the_points() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let (cloud, camera) = scene("statue", 30_000);
     let colors = (0..cloud.len()).map(|i| [(i % 255) as u8, 10, 200]).collect();
     let cloud = cloud.with_colors(colors).expect("a colour each");

@@ -15,17 +15,6 @@ const CAMERA: Camera = Camera {
     projection: Projection::PerspectiveFovDeg(35.0),
 };
 
-fn gpu() -> Option<Renderer> {
-    match Renderer::with_backend(Backend::Gpu) {
-        Ok(renderer) => Some(renderer),
-        Err(error) => {
-            assert!(std::env::var_os("CI").is_none(), "{error}");
-            eprintln!("nothing checked: {error}");
-            None
-        }
-    }
-}
-
 fn kd_tree(first_radius: f32, k: u32) -> Settings {
     let mut settings = Settings::default();
     settings.reconstruction.engine = SearchEngine::KdTree { first_radius };
@@ -45,7 +34,7 @@ fn different(a: &Image, b: &Image, steps: u8) -> f64 {
 /// Visible neighbours and neighbours in the cloud are nearly the same if pixels are no coarser than the points.
 #[test]
 fn pictures_are_nearly_those_of_the_screen_grid() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let cloud = cloud(crate::test_clouds::sphere(30_000));
     let mut settings = kd_tree(0.1, 10);
     let tree = gpu.render(&cloud, &CAMERA, SIZE, &settings).expect("a picture");
@@ -61,7 +50,7 @@ fn pictures_are_nearly_those_of_the_screen_grid() {
 
 #[test]
 fn every_test_cloud_and_every_k() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     for (name, positions) in crate::test_clouds::all(3000) {
         let cloud = cloud(positions);
         for k in [1, 10, 64] {
@@ -85,7 +74,7 @@ fn every_test_cloud_and_every_k() {
 /// because only one such point is visible.
 #[test]
 fn points_in_one_place_have_no_surface() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let mut positions = crate::test_clouds::plane(3000);
     let seen = gpu.render(&cloud(positions.clone()), &CAMERA, SIZE, &kd_tree(0.3, 10)).expect("a picture").counts;
     positions.extend([[0.0, 0.0, -0.5]; 3000]);
@@ -95,7 +84,7 @@ fn points_in_one_place_have_no_surface() {
 
 #[test]
 fn the_best_radius_is_accurate() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let cloud = cloud(crate::test_clouds::sphere(8000));
     for k in [1, 10] {
         let best = best_first_radius(&mut gpu, &cloud, &CAMERA, SIZE, &kd_tree(1.0, k), 0.99).expect("a radius");

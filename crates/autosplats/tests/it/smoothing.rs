@@ -7,16 +7,6 @@ use autosplats::{Backend, Camera, Error, GBuffer, Projection, Reconstruction, Re
 
 const SIZE: [u32; 2] = [240, 180];
 
-/// Renderers of all available backends.
-fn renderers() -> Vec<Renderer> {
-    let gpu = Renderer::with_backend(Backend::Gpu);
-    if let Err(error) = &gpu {
-        assert!(std::env::var_os("CI").is_none(), "{error}");
-        eprintln!("checked on the CPU only: {error}");
-    }
-    [Some(Renderer::new()), gpu.ok()].into_iter().flatten().collect()
-}
-
 fn settings(frames_averaged: u32) -> Settings {
     let reconstruction = Reconstruction { frames_averaged, ..Reconstruction::default() };
     Settings { reconstruction, all_layers: true, ..Settings::default() }
@@ -48,7 +38,7 @@ fn mean_difference(a: &[f32], b: &[f32]) -> f32 {
 
 #[test]
 fn noise_is_averaged_over_frames() {
-    for mut renderer in renderers() {
+    for mut renderer in crate::renderers() {
         let adapter = renderer.adapter();
         let mut shivers = |frames_averaged: u32| {
             let mut random = Random::new(1);
@@ -74,7 +64,7 @@ fn noise_is_averaged_over_frames() {
 
 #[test]
 fn another_surface_is_not_held_back() {
-    for mut renderer in renderers() {
+    for mut renderer in crate::renderers() {
         let mut random = Random::new(2);
         let [near, far] = [0.4, 0.0].map(|height| wave(height, 0.0, &mut random));
         let view = camera(DVec3::new(0.3, 0.2, 3.0));
@@ -91,7 +81,7 @@ fn another_surface_is_not_held_back() {
 /// Smoothing does not change a surface without noise.
 #[test]
 fn a_moving_camera_sees_the_same_surface() {
-    for mut renderer in renderers() {
+    for mut renderer in crate::renderers() {
         let cloud = wave(0.0, 0.0, &mut Random::new(3));
         let view = |frame: i32| camera(DVec3::new(0.3 + 0.05 * f64::from(frame), 0.2, 3.0 - 0.04 * f64::from(frame)));
         for frame in 0..8 {
@@ -123,7 +113,7 @@ fn mean_degrees(a: &[Vec3], b: &[Vec3]) -> f32 {
 /// Noise looks different in each view of the same points. Smoothed normals change less and are as accurate.
 #[test]
 fn the_same_points_are_steady_while_the_camera_moves() {
-    for mut renderer in renderers() {
+    for mut renderer in crate::renderers() {
         let adapter = renderer.adapter();
         let cloud = wave(0.0, 0.02, &mut Random::new(6));
         let truth = wave(0.0, 0.0, &mut Random::new(6));
@@ -152,7 +142,7 @@ fn steady_pictures_flicker_less() {
     let cloud = wave(0.0, 0.004, &mut Random::new(9));
     let view = |frame: i32| camera(DVec3::new(0.3 + 0.002 * f64::from(frame), 0.2, 3.0));
     let mut steady_pictures = Vec::new();
-    for mut renderer in renderers() {
+    for mut renderer in crate::renderers() {
         let adapter = renderer.adapter();
         let mut shown = |steady: bool| {
             let reconstruction = Reconstruction { steady, ..Reconstruction::default() };
@@ -195,7 +185,7 @@ fn what_is_not_alike_begins_anew() {
         ("whole splats", with(&|reconstruction| reconstruction.trim = false), view(3)),
         ("projection", usual.clone(), parallel),
     ];
-    for mut renderer in renderers() {
+    for mut renderer in crate::renderers() {
         let backend = if renderer.adapter().is_some() { Backend::Gpu } else { Backend::Cpu };
         for (name, settings, camera) in &others {
             for frame in 0..3 {
@@ -232,7 +222,7 @@ fn what_is_not_alike_begins_anew() {
 /// Detail as fine as the points is as accurate after several frames as in a single one.
 #[test]
 fn detail_is_not_blurred() {
-    for mut renderer in renderers() {
+    for mut renderer in crate::renderers() {
         let mut random = Random::new(7);
         let ripple = |random: &mut Random| {
             let [x, y] = [random.signed(), random.signed()];
@@ -283,7 +273,7 @@ fn the_same_frames_again_are_the_same() {
     };
     let mut of_backends = Vec::new();
     for backend in
-        renderers().iter().map(|renderer| if renderer.adapter().is_some() { Backend::Gpu } else { Backend::Cpu })
+        crate::renderers().iter().map(|renderer| if renderer.adapter().is_some() { Backend::Gpu } else { Backend::Cpu })
     {
         let [first, again] = [0, 1].map(|_| film(&mut Renderer::with_backend(backend).expect("a device")));
         assert!(first == again, "{backend:?}: bits differ");

@@ -21,7 +21,7 @@ pub(super) fn own_device_with(required_features: wgpu::Features, binding: u64) -
 
 #[test]
 fn a_cloud_larger_than_a_binding_on_the_callers_own_device() {
-    if gpu().is_none() {
+    if crate::gpu().is_none() {
         return;
     }
     let (cloud, camera) = scene("statue", 1_000_000);
@@ -58,7 +58,7 @@ fn a_cloud_larger_than_a_binding_on_the_callers_own_device() {
 
 #[test]
 fn clouds_of_any_size_follow_each_other() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     let (whole, camera) = scene("statue", 60_000);
     for points in [60_000, 30_000, 61, 45_000, 59_000, 2_000] {
         let mut cloud = whole.clone();
@@ -72,7 +72,7 @@ fn clouds_of_any_size_follow_each_other() {
 
 #[test]
 fn a_callers_texture_gets_the_same_picture() {
-    if gpu().is_none() {
+    if crate::gpu().is_none() {
         return;
     }
     let (device, queue) = own_device(128 << 20).expect("a device");
@@ -147,7 +147,7 @@ fn read_texture(
 
 #[test]
 fn an_upload_can_be_stopped() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     // More points than one upload step takes.
     let cloud = PointCloud::new(DVec3::ZERO, crate::test_clouds::plane(12_000_000));
     let stopped = gpu.upload(&cloud, &Settings::default(), &|fraction| fraction < 0.1);
@@ -158,7 +158,7 @@ fn an_upload_can_be_stopped() {
 
 #[test]
 fn a_device_that_is_lost_says_so() {
-    if gpu().is_none() {
+    if crate::gpu().is_none() {
         return;
     }
     let (cloud, camera) = scene("figure", 20_000);

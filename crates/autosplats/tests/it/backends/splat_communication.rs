@@ -17,7 +17,7 @@ fn by_communication() -> Settings {
 /// takes at most ten iterations.
 #[test]
 fn splat_communication_in_every_scene() {
-    let Some(mut gpu) = gpu() else { return };
+    let Some(mut gpu) = crate::gpu() else { return };
     for (name, _) in Scene::names() {
         let (cloud, camera) = scene(name, 20_000);
         let exact = gpu.render(&cloud, &camera, SIZE, &by(SearchEngine::ScreenGrid)).expect("a picture").image.clone();
@@ -57,7 +57,7 @@ fn splat_communication_is_refused_where_it_cannot_run() {
     let message = refused(&mut cpu);
     assert!(message.contains("runs on a GPU only") && message.contains("screen-grid"), "{message}");
     assert!(cpu.convergence().expect("none").is_empty(), "nothing was searched for");
-    if gpu().is_none() {
+    if crate::gpu().is_none() {
         return;
     }
     let (device, queue) = own_device(128 << 20).expect("a device");
