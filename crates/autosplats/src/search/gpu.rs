@@ -25,7 +25,7 @@ pub(crate) struct SearchBuffers<'a> {
 }
 
 /// The compiled passes of an engine, for one k.
-pub(crate) trait EnginePasses: Debug {
+pub(crate) trait EnginePasses: Debug + Send {
     /// Allocates the engine's own buffers and returns the steps of each [`Round`].
     ///
     /// # Errors

@@ -3,9 +3,7 @@
 use crate::test_clouds::EYE;
 use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::DVec3;
-use autosplats::{
-    Backend, Camera, Error, Image, Projection, Renderer, SearchEngine, Settings, best_first_radius, wgpu,
-};
+use autosplats::{Camera, Error, Image, Projection, Renderer, SearchEngine, Settings, best_first_radius, wgpu};
 
 const SIZE: [u32; 2] = [320, 240];
 const CAMERA: Camera = Camera {

@@ -2,7 +2,7 @@
 
 use autosplats::cloud::glam::{DMat4, DVec3, Vec3};
 use autosplats::cloud::{PointCloud, Scan};
-use autosplats::{Backend, Backs, Camera, ColorMode, GBuffer, Image, Projection, Renderer, Settings, Shading};
+use autosplats::{Backs, Camera, ColorMode, GBuffer, Image, Projection, Renderer, Settings, Shading};
 
 const SIZE: [u32; 2] = [240, 180];
 const ORIGIN: DVec3 = DVec3::new(5e5, 5e6, 200.0);
