@@ -26,7 +26,8 @@ usage: cargo xtask test               everything that a change has to pass: rule
        cargo xtask quality --compare BEFORE AFTER
                                   what changed between two such files; fails if an error grew by more than 3 %
        cargo xtask formats            docs/FORMATS.md, from what the program says of its formats and of the test data;
-                                  with --check only whether it is what this build makes
+                                  with --check only whether it is what this build makes, with --program PATH by that
+                                  build of the command
        cargo xtask performance --page | --machine NAME [--only TEXT] [--program PATH --commit HASH]
                                   docs/PERFORMANCE.md, from docs/performance/*.json; NAME.json is measured first, in some ten
                                   minutes, with --only those jobs that contain TEXT, as gpu does, with --program another build
@@ -47,6 +48,7 @@ fn main() -> ExitCode {
         ["fuzz", options @ ..] => root().and_then(|root| fuzz(root, options)),
         ["quality", options @ ..] => root().and_then(|root| quality(root, options)),
         ["formats"] => root().and_then(|root| formats::write(root, &formats::build(root)?)),
+        ["formats", "--program", program] => root().and_then(|root| formats::write(root, program.as_ref())),
         ["formats", "--check"] => root().and_then(|root| formats::check(root, &formats::build(root)?)),
         ["performance", options @ ..] => root().and_then(|root| performance::run(root, options)),
         ["pictures", "--compare", before, after] => {
