@@ -493,5 +493,6 @@ fn constants_and_overlaps_take_no_memory() {
     assert!(message(&file(&[], &"<a>".repeat(300_000))).contains("XML section"), "deep nesting");
     let laughs = "<!DOCTYPE a [<!ENTITY b \"bbbb\">]><e57Root>&b;</e57Root>";
     assert!(message(&file(&[], laughs)).contains("XML section"), "entities");
-    assert!(start.elapsed() < Duration::from_secs(10), "all at once: {:?}", start.elapsed());
+    // Far above what they take on a slow machine: quadratic time is what this looks for.
+    assert!(start.elapsed() < Duration::from_secs(100), "all at once: {:?}", start.elapsed());
 }

@@ -373,7 +373,7 @@ fn stl_corners_are_welded() {
     assert!(error("a.stl", &binary[..50]).contains("before the first triangle"), "binary cut off early");
     assert!(error("a.stl", &[0; 50]).contains("inside the header"), "no text");
     assert!(
-        error("a.stl", text.replace("vertex", "vortex").as_bytes()).contains("line 4: 'vortex' is no word"),
+        error("a.stl", text.replace("vertex", "vortex").as_bytes()).contains("line 4: 'vortex' is not an STL keyword"),
         "typo"
     );
     let (longer, notes) = mesh("a.stl", &[&binary[..], b"junk"].concat());

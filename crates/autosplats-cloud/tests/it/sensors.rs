@@ -229,7 +229,7 @@ fn pictures_without_depth_and_broken_ones() {
         ("a.pgm", b"P5 3 2 255\n123456".to_vec(), ["without depth", "8-bit grey"]),
         ("a.pgm", b"P5 3 2 65535\n123456".to_vec(), ["3 of 6 pixels", "copy"]),
         ("a.pgm", b"P2 3 2 65535\n1 2 3 4 5 70000".to_vec(), ["line 2", "'70000'"]),
-        ("a.pgm", b"P5 3 x 65535\n".to_vec(), ["byte 4", "'x' is no height"]),
+        ("a.pgm", b"P5 3 x 65535\n".to_vec(), ["byte 4", "'x' is not a valid height"]),
         ("a.pgm", b"P5 16000000 16000000 65535\n12".to_vec(), ["1 of 256000000000000 pixels", "copy"]),
         ("a.pgm", b"P6 3 2 255\n".to_vec(), ["byte 0", "PGM"]),
         ("a.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIH".to_vec(), ["byte 12", "copy"]),

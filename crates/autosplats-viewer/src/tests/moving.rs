@@ -123,7 +123,7 @@ fn films_show_what_moves_or_stand_still() {
     let context = window.harness.ctx.clone();
     crate::keys::run(window.harness.state_mut(), &context, Command::Film);
     window.steps(3);
-    assert!(window.says("0.00 to 0.30 s at 1.00×, over and over"), "it runs: {:?}", window.words());
+    assert!(window.says("0.00 to 0.30 s at 1.00×, repeatedly"), "it runs: {:?}", window.words());
     window.harness.state_mut().panels.film.still_for_tests();
     let once = film(&mut window, "runs once", &out.path().join("once.png"));
     assert_eq!(once.len(), 3, "ten a second for 0.3 s");

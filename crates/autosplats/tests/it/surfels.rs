@@ -181,6 +181,6 @@ fn planes_of_another_cloud_are_refused() {
     one_less[2].radius.pop();
     for (normals, what) in one_less.iter().zip(["normals", "curvatures", "radii"]) {
         let message = refused(normals);
-        assert!(message.ends_with(&format!("19999 {what} for 20000 points")), "{message}");
+        assert!(message.contains(&format!("19999 {what} for 20000 points")), "{message}");
     }
 }
