@@ -10,7 +10,7 @@ mod pictures;
 mod programs;
 mod test;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -89,6 +89,15 @@ fn fuzz(root: &Path, options: &[&str]) -> Result<()> {
 /// Pictures against exact surfaces. Built for speed, as all cases are measured; the tests measure the small ones.
 fn quality(root: &Path, options: &[&str]) -> Result<()> {
     cargo(root, &[&["run", "--locked", "--quiet", "--release", "-p", "autosplats-quality", "--"], options].concat())
+}
+
+/// Builds the command without the window in a profile, and returns its path.
+fn build_command(root: &Path, profile: &str) -> Result<PathBuf> {
+    let command = ["--package", "autosplats-cli", "--no-default-features"];
+    cargo(root, &[&["build", "--locked", "--profile", profile][..], &command].concat())?;
+    let this_program = std::env::current_exe()?;
+    let target = this_program.ancestors().nth(2).context("cargo xtask runs target/debug/xtask")?;
+    Ok(target.join(profile).join(format!("autosplats{}", std::env::consts::EXE_SUFFIX)))
 }
 
 fn cargo(root: &Path, arguments: &[&str]) -> Result<()> {

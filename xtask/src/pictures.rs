@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context as _, Result, bail, ensure};
 use sha2::{Digest as _, Sha256};
 
-use crate::{cargo, cargo_command};
+use crate::build_command;
 
 /// The file of hashes: a line per output, `HASH NAME`, or `exit CODE NAME` for a command that fails.
 const HASHES: &str = "hashes.txt";
@@ -118,21 +118,12 @@ pub(crate) fn run(root: &Path, task: &Task<'_>) -> Result<()> {
             let data = data.canonicalize().with_context(|| format!("{}: the test data are needed", data.display()))?;
             let program = match program {
                 Some(program) => program.canonicalize().with_context(|| program.display().to_string())?,
-                None => build(root)?,
+                None => build_command(root, "release")?,
             };
             render(&program, &data, out)
         }
         Task::Compare(folders) => compare(*folders),
     }
-}
-
-/// Builds the command for speed, without the window.
-fn build(root: &Path) -> Result<PathBuf> {
-    cargo(root, &["build", "--locked", "--release", "--package", "autosplats-cli", "--no-default-features"])?;
-    let target = cargo_command(root).args(["metadata", "--no-deps", "--format-version", "1"]).output()?;
-    let metadata: serde_json::Value = serde_json::from_slice(&target.stdout).context("cargo metadata")?;
-    let target = metadata["target_directory"].as_str().context("cargo metadata names the target folder")?;
-    Ok(Path::new(target).join("release").join(if cfg!(windows) { "autosplats.exe" } else { "autosplats" }))
 }
 
 fn render(program: &Path, data: &Path, out: &Path) -> Result<()> {

@@ -30,7 +30,7 @@ pub(crate) fn run(root: &Path, words: &[&str]) -> Result<()> {
         let described = || answer(Command::new("git").current_dir(root).args(["describe", "--always", "--dirty"]));
         let commit = options.get("--commit").map_or_else(described, |commit| Ok((*commit).to_owned()))?;
         let find = |path: &&str| Path::new(path).canonicalize().with_context(|| (*path).to_owned());
-        let program = options.get("--program").map_or_else(|| build(root), find)?;
+        let program = options.get("--program").map_or_else(|| build_command(root, "dist"), find)?;
         let mut results = measure::all(&program, options.get("--only").copied().unwrap_or_default())?;
         results["commit"] = commit.into();
         results["date"] = answer(Command::new("date").args(["-u", "+%F"]))?.into();
@@ -43,14 +43,6 @@ pub(crate) fn run(root: &Path, words: &[&str]) -> Result<()> {
         }
     }
     write(root.join(PAGE), page::page(&machines(root)?)).context(PAGE)
-}
-
-/// Builds the command without the window and returns its path.
-fn build(root: &Path) -> Result<PathBuf> {
-    cargo(root, &["build", "--locked", "--release", "--package", "autosplats-cli", "--no-default-features"])?;
-    let this_program = std::env::current_exe()?;
-    let target = this_program.ancestors().nth(2).context("cargo xtask runs target/debug/xtask")?;
-    Ok(target.join("release").join(format!("autosplats{}", std::env::consts::EXE_SUFFIX)))
 }
 
 /// What a command prints.
