@@ -18,7 +18,7 @@ const DIGITS: usize = 5;
 ///
 /// use autosplats_film::{Error, Target};
 ///
-/// let Target::Frames(frames) = Target::new("turn_%03d.png".as_ref())? else { panic!("no film") };
+/// let Target::Frames(frames) = Target::new("turn_%03d.png".as_ref())? else { panic!("a film") };
 /// assert_eq!(frames.file(7), PathBuf::from("turn_007.png"));
 /// assert_eq!(Target::new("turn.mp4".as_ref())?, Target::Film("turn.mp4".into()));
 /// assert!(matches!(Target::new("turn.gif".as_ref()), Err(Error::Name { .. })));
@@ -40,7 +40,7 @@ pub enum Target {
 /// use autosplats_film::Target;
 ///
 /// let target = Target::new("frames/turn_%03d.png".as_ref())?;
-/// let Target::Frames(frames) = target else { panic!("no film") };
+/// let Target::Frames(frames) = target else { panic!("a film") };
 /// assert!(frames.file(12).ends_with("turn_012.png"));
 /// assert!(frames.pattern().ends_with("turn_….png"));
 /// # Ok::<(), autosplats_film::Error>(())
@@ -93,9 +93,9 @@ impl Target {
     ///
     /// use autosplats_film::Target;
     ///
-    /// let Target::Frames(one) = Target::one("scan.png".as_ref())? else { panic!("no film") };
+    /// let Target::Frames(one) = Target::one("scan.png".as_ref())? else { panic!("a film") };
     /// assert_eq!(one.file(0), PathBuf::from("scan.png"));
-    /// let Target::Frames(many) = Target::new("scan.png".as_ref())? else { panic!("no film") };
+    /// let Target::Frames(many) = Target::new("scan.png".as_ref())? else { panic!("a film") };
     /// assert_eq!(many.file(0), PathBuf::from("scan_00000.png"));
     /// # Ok::<(), autosplats_film::Error>(())
     /// ```

@@ -46,7 +46,7 @@ pub use settings::{Background, Backs, ColorMap, ColorMode, Shading};
 ///
 /// let pixels = [0, 255, 255, 0].map(|grey| [grey, grey, grey, 255]).to_vec();
 /// let image = Image { width: 2, height: 2, pixels, ..Image::default() };
-/// // The mean is one of light, which is brighter than that of the numbers.
+/// // Half the light of white is brighter than half its number, 128.
 /// assert_eq!(image.averaged(2).pixels, [[188, 188, 188, 255]]);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
