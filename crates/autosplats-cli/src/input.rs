@@ -42,12 +42,12 @@ pub(crate) struct Inputs {
 impl PlayingArgs {
     /// The options for the library.
     pub(crate) fn options(&self) -> PlayOptions {
-        let Self { fps, topics, fixed_frame, decay, accumulate, sample, scan } = self;
+        let Self { fps, topics, fixed_frame, decay, accumulate, strew, scan } = self;
         PlayOptions {
             fps: *fps,
             topics: topics.clone(),
             frame: fixed_frame.clone(),
-            sample: *sample,
+            sample: *strew,
             scanners: scan.map(usize::from),
             latest: LatestOptions { decay: *decay, accumulate: *accumulate, ..LatestOptions::default() },
             ..PlayOptions::default()
@@ -269,7 +269,7 @@ impl Inputs {
     /// Plays a file or a folder as it changes.
     fn watch(&self, path: &Path, name: &str) -> Result<Player, Failure> {
         if self.play.sample.is_some() || self.play.scanners.is_some() {
-            return Err(Failure::usage(format!("--watch: {name} cannot be sampled; leave out --sample and --scan")));
+            return Err(Failure::usage(format!("--watch: {name} cannot be sampled; leave out --strew and --scan")));
         }
         let stream = Live::watch(path, &self.options).map_err(read_failure)?;
         Ok(Player::new(Box::new(stream), self.play.latest.clone()))
