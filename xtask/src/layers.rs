@@ -12,17 +12,8 @@ use syn::visit::{self, Visit};
 /// The stages of `autosplats` in the order of a frame. Its other rooms come before all stages.
 const STAGES: [&str; 8] = ["project", "search", "fit", "normals", "adapt", "splat", "shade", "renderer"];
 
-/// The crates that are checked.
-const CRATES: [&str; 8] = [
-    "crates/autosplats",
-    "crates/autosplats-cloud",
-    "crates/autosplats-film",
-    "crates/autosplats-viewer",
-    "crates/autosplats-cli",
-    "quality",
-    "fuzz",
-    "xtask",
-];
+/// Members of the workspace that are not below `crates`.
+const OTHER_CRATES: [&str; 3] = ["quality", "fuzz", "xtask"];
 
 /// Circles of rooms that are known and still to be cut, by crate. None may be added, and one that is cut leaves the
 /// list.
@@ -63,7 +54,12 @@ type Arrows = BTreeMap<(String, String), PathBuf>;
 /// Checks every crate below `root`.
 pub(crate) fn check(root: &Path) -> Result<()> {
     let mut wrong = Vec::new();
-    for name in CRATES {
+    let mut crates: Vec<String> = OTHER_CRATES.map(str::to_owned).to_vec();
+    for entry in read_dir(root.join("crates"))? {
+        crates.push(format!("crates/{}", entry?.file_name().display()));
+    }
+    crates.sort();
+    for name in crates.iter().map(String::as_str) {
         let house = House::read(&root.join(name).join("src"))?;
         let arrows = house.arrows();
         if name == "crates/autosplats" {
@@ -146,7 +142,11 @@ impl House {
         let mut paths = Vec::new();
         collect(source, &mut paths)?;
         // Tests may use what is built on a room.
-        paths.retain(|path| !path.iter().any(|part| part == "tests" || part == "tests.rs"));
+        let is_test = |path: &PathBuf| {
+            let below = path.strip_prefix(source).unwrap_or(path);
+            below.iter().any(|part| part == "tests" || part == "tests.rs")
+        };
+        paths.retain(|path| !is_test(path));
         ensure!(!paths.is_empty(), "there is no Rust file in {}", source.display());
         let mut house = Self { files: Vec::new(), aliases: BTreeMap::new(), modules: BTreeSet::from([Vec::new()]) };
         for path in paths {
@@ -248,6 +248,8 @@ fn module_of(file: &Path) -> Module {
 /// Every path of two names and more that a file writes down, and what its `use` lines call by which name.
 #[derive(Default)]
 struct Named {
+    /// Modules written out in the file that the visit is inside of; `super` leads out of them first.
+    depth: usize,
     paths: Vec<Vec<String>>,
     aliases: Vec<(String, Vec<String>)>,
 }
@@ -264,7 +266,7 @@ impl Named {
             syn::UseTree::Rename(name) => {
                 self.alias(Some(name.rename.to_string()), [before, &[name.ident.to_string()]].concat());
             }
-            syn::UseTree::Glob(_) => self.paths.push(before.to_vec()),
+            syn::UseTree::Glob(_) => self.push(before.to_vec()),
             syn::UseTree::Group(group) => group.items.iter().for_each(|tree| self.tree(before, tree)),
         }
     }
@@ -276,18 +278,40 @@ impl Named {
         for path in text.split(|character| !in_path(character)) {
             let names: Vec<String> = path.split("::").map(str::to_owned).collect();
             if names.len() > 1 && names.iter().all(|name| !name.is_empty() && !name.contains(':')) {
-                self.paths.push(names);
+                self.push(names);
             }
         }
     }
 
-    fn alias(&mut self, name: Option<String>, path: Vec<String>) {
-        self.aliases.extend(name.map(|name| (name, path.clone())));
+    fn push(&mut self, path: Vec<String>) {
+        let leading = path.iter().take_while(|name| *name == "super").count().min(self.depth);
+        let path = if leading > 0 { [&["self".to_owned()], &path[leading..]].concat() } else { path };
         self.paths.push(path);
+    }
+
+    fn alias(&mut self, name: Option<String>, path: Vec<String>) {
+        // A name inside a written-out module is none of the file's.
+        if self.depth == 0 {
+            self.aliases.extend(name.map(|name| (name, path.clone())));
+        }
+        self.push(path);
     }
 }
 
 impl<'ast> Visit<'ast> for Named {
+    fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
+        let is_test = |attribute: &syn::Attribute| {
+            attribute.path().is_ident("cfg")
+                && attribute.meta.require_list().is_ok_and(|list| list.tokens.to_string() == "test")
+        };
+        if item.attrs.iter().any(is_test) {
+            return;
+        }
+        self.depth += 1;
+        visit::visit_item_mod(self, item);
+        self.depth -= 1;
+    }
+
     fn visit_item_use(&mut self, item: &'ast syn::ItemUse) {
         self.tree(&[], &item.tree);
     }
@@ -305,7 +329,7 @@ impl<'ast> Visit<'ast> for Named {
     fn visit_path(&mut self, path: &'ast syn::Path) {
         let names: Vec<String> = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
         if names.len() > 1 && path.leading_colon.is_none() {
-            self.paths.push(names);
+            self.push(names);
         }
         visit::visit_path(self, path);
     }
@@ -350,6 +374,9 @@ mod tests {
         assert_eq!(found("use crate::search::*;"), ["fit search"], "a glob");
         assert_eq!(found("fn f() { assert!(g(crate::splat::cpu::f()), \"{}\", 1) }"), ["fit splat"], "in a macro");
         assert_eq!(found("#[error(\"{}\", crate::search::A)] struct B;"), ["fit search"], "in an attribute");
+        assert_eq!(found("mod inner { use super::super::search::A; }"), [""; 0], "super leads out of the inner module");
+        assert_eq!(found("mod inner { use super::super::super::search::A; }"), ["fit search"], "and once more");
+        assert_eq!(found("#[cfg(test)] mod tests { use crate::splat::A; }"), [""; 0], "tests may use what is later");
         assert_eq!(found("// use crate::splat::A;\nuse std::search::B; use super::C;"), [""; 0], "none of these");
     }
 

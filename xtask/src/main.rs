@@ -16,10 +16,10 @@ use std::process::{Command, ExitCode};
 use anyhow::{Context as _, Result, bail, ensure};
 
 const USAGE: &str = "\
-usage: cargo xtask test               everything that a change has to pass: rules, lints, documentation, build, tests
-       cargo xtask rules              of these what takes seconds: format, imports, lengths, dependencies
-       cargo xtask peers              of the tests those of Zenoh and with programs of others, for which it gets a Python
-       cargo xtask fuzz [OPTIONS]     broken files for every reader, as long as wanted; --help tells the options
+usage: cargo xtask test               runs every check of CI: rules, lints, documentation, build, tests
+       cargo xtask rules              runs the checks that take seconds: format, imports, lengths, dependencies
+       cargo xtask peers              runs the tests with Zenoh and with programs of others; installs their Python packages
+       cargo xtask fuzz [OPTIONS]     gives broken files to every reader; --help lists the options
        cargo xtask quality [OPTIONS]  measures pictures against exact surfaces, in ten minutes, prints what changed since
                                   docs/quality/measures.json, and writes that file and docs/QUALITY.md anew unless an
                                   error grew by more than 3 %; --quick and --only NAME measure some cases; see --help

@@ -160,6 +160,10 @@ fn render(program: &Path, data: &Path, out: &Path) -> Result<()> {
         let _ = writeln!(hashes, "{hex} {}", file.file_name().display());
     }
     let failed = failed.into_inner().expect("no worker panics");
+    for backend in ["cpu ", "gpu "] {
+        let made = files.iter().any(|file| file.file_name().to_string_lossy().starts_with(backend));
+        ensure!(made, "no {backend}picture was made; a GPU's need a driver, and software Vulkan will do");
+    }
     for (name, code) in &failed {
         let _ = writeln!(hashes, "exit {code} {name}");
     }
@@ -267,7 +271,8 @@ fn compare(folders: [&Path; 2]) -> Result<()> {
         println!("differs: {name}");
     }
     ensure!(differing.is_empty(), "{} of {} outputs differ", differing.len(), before.len());
-    println!("all {} outputs are equal", before.len());
+    let failed = before.iter().filter(|line| line.starts_with("exit ")).count();
+    println!("all {} outputs are equal, and {failed} runs end in the same exit code", before.len() - failed);
     Ok(())
 }
 

@@ -1,13 +1,14 @@
 //! The programs of tests that cargo builds, run beside each other: many tests wait, for files that change and points
 //! that come, while others compute.
 
-use std::io::Write as _;
+use std::fs::File;
+use std::io::{Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use serde_json::Value;
@@ -16,6 +17,9 @@ use crate::{FEATURES, cargo_command};
 
 /// Programs that run at a time.
 const LANES: usize = 3;
+
+/// What a program may take at the most: far more than any does, and less than whoever started the tests waits.
+const LIMIT: Duration = Duration::from_secs(40 * 60);
 
 /// Programs that take longest, in this order; what comes last in its lane should be short.
 const LONGEST_FIRST: [&str; 4] = ["autosplats-quality it", "autosplats it", "autosplats lib", "autosplats-fuzz"];
@@ -106,11 +110,35 @@ impl Programs {
 }
 
 impl Program {
+    /// Runs it to its end, or to the [time limit](LIMIT).
     fn run(&self) -> Result<Output> {
+        println!("-- {} starts", self.name);
         let mut command = Command::new(&self.executable);
         // As in `cargo_command`: else Mesa says for each device that there is no Wayland.
         command.current_dir(&self.folder).env("NODEVICE_SELECT", "1").env("CARGO_MANIFEST_DIR", &self.folder);
-        command.stdin(Stdio::null()).output().with_context(|| self.executable.display().to_string())
+        // Files, not pipes: a program that says much does not wait for whoever reads it.
+        let [mut stdout, mut stderr] = [tempfile::tempfile()?, tempfile::tempfile()?];
+        command.stdin(Stdio::null()).stdout(stdout.try_clone()?).stderr(stderr.try_clone()?);
+        let mut child = command.spawn().with_context(|| self.executable.display().to_string())?;
+        let start = Instant::now();
+        let status = loop {
+            match child.try_wait()? {
+                Some(status) => break status,
+                None if start.elapsed() > LIMIT => {
+                    child.kill()?;
+                    println!("-- {}: stopped after {} minutes", self.name, LIMIT.as_secs() / 60);
+                    break child.wait()?;
+                }
+                None => thread::sleep(Duration::from_millis(50)),
+            }
+        };
+        let read = |file: &mut File| -> Result<Vec<u8>> {
+            let mut bytes = Vec::new();
+            file.rewind()?;
+            file.read_to_end(&mut bytes)?;
+            Ok(bytes)
+        };
+        Ok(Output { status, stdout: read(&mut stdout)?, stderr: read(&mut stderr)? })
     }
 }
 
@@ -169,6 +197,7 @@ mod tests {
         assert!(Programs::from_messages("").is_err(), "no test at all is an error");
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_program_that_fails_is_named() {
         let program = |script: &str, name: &str| Program {

@@ -53,6 +53,23 @@ pub(crate) fn everything(root: &Path) -> Result<()> {
         component("clippy", "clippy")
     })?;
     cheap(root, &mut steps)?;
+    let deny = ["--", "-D", "warnings"];
+    steps.step("lints", || {
+        cargo(root, &[&["clippy", "--locked", "--workspace"][..], &FEATURES, &["--all-targets"], &deny].concat())
+    })?;
+    // What README builds: the command with the window and without Zenoh, and the command alone. Features that only
+    // Zenoh switches on would hide what these lack.
+    steps.step("lints without Zenoh, and without the window", || {
+        let command = ["clippy", "--locked", "-p", "autosplats-cli"];
+        cargo(root, &[&command[..], &deny].concat())?;
+        cargo(root, &[&command[..], &["--no-default-features"], &deny].concat())
+    })?;
+    steps.step("documentation", || {
+        let mut command = cargo_command(root);
+        // With examples, though there are none, the libraries' documentation stands on what the lints have checked.
+        command.args(["doc", "--locked", "--workspace", "--no-deps", "--lib", "--examples"]).args(FEATURES);
+        run(command.env("RUSTDOCFLAGS", "-D warnings"))
+    })?;
     let programs = steps.step("build of tests", || Programs::build(root))?;
     steps.step("tests", || programs.run())?;
     steps.step("tests of examples", || {
@@ -62,20 +79,6 @@ pub(crate) fn everything(root: &Path) -> Result<()> {
     if let Ok(python) = &*python.borrow() {
         steps.step("tests with programs of others", || peers::test(root, python, &["--ignored"]))?;
     }
-    let deny = ["--", "-D", "warnings"];
-    steps.step("lints", || {
-        cargo(root, &[&["clippy", "--locked", "--workspace"][..], &FEATURES, &["--all-targets"], &deny].concat())
-    })?;
-    // The few lines that are there only without Zenoh or without the window.
-    steps.step("lints of the command alone", || {
-        cargo(root, &[&["clippy", "--locked", "-p", "autosplats-cli", "--no-default-features"][..], &deny].concat())
-    })?;
-    steps.step("documentation", || {
-        let mut command = cargo_command(root);
-        // With examples, though there are none, the libraries' documentation stands on what the lints have checked.
-        command.args(["doc", "--locked", "--workspace", "--no-deps", "--lib", "--examples"]).args(FEATURES);
-        run(command.env("RUSTDOCFLAGS", "-D warnings"))
-    })?;
     steps.summary();
     python.borrow().as_ref().err().into_iter().for_each(left_out);
     Ok(())

@@ -12,7 +12,7 @@ use std::process::Command;
 use anyhow::{Context as _, Result, ensure};
 use serde_json::Value;
 
-use crate::cargo;
+use crate::build_command;
 
 /// One JSON file per machine: what it is, the commit, the date, and a list of rows for each table.
 const FOLDER: &str = "docs/performance";

@@ -211,11 +211,13 @@ impl Renderer {
         Ok(Self { form: BackendRenderer::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?)) })
     }
 
-    /// Creates another renderer in the same place: on the CPU, or on the same device. On a device the two share what is
-    /// compiled, so the second one starts sooner; each keeps its own points and buffers.
+    /// Creates another renderer in the same place: on the CPU, or on the same device. On a device the two share the
+    /// compute passes compiled so far, so the second one starts sooner. Each keeps its own points and buffers.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`], [`Error::DeviceLost`].
+    ///
+    /// # Examples
     ///
     /// ```
     /// use autosplats::Renderer;

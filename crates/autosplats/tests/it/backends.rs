@@ -346,7 +346,7 @@ fn the_frames_before_leave_no_trace() {
             };
             let after = picture(&mut renderer, &settings);
             let backend = if renderer.adapter().is_some() { Backend::Gpu } else { Backend::Cpu };
-            let mut fresh = Renderer::with_backend(backend).expect("a device");
+            let mut fresh = renderer.another().expect("a renderer");
             assert!(picture(&mut fresh, &settings) == after, "{backend:?}, k = {k}, frame {at}");
             let reconstruction = Reconstruction { coherent: false, ..settings.reconstruction.clone() };
             let alone = Settings { reconstruction, ..settings.clone() };

@@ -4,8 +4,7 @@ use crate::test_clouds::EYE;
 use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::{DVec3, Vec3};
 use autosplats::{
-    Backend, Camera, ColorMode, Error, NormalSettings, Normals, PointSurfel, Projection, Renderer, Settings,
-    estimate_normals,
+    Camera, ColorMode, Error, NormalSettings, Normals, PointSurfel, Projection, Renderer, Settings, estimate_normals,
 };
 
 const SIZE: [u32; 2] = [300, 300];
@@ -67,8 +66,7 @@ fn surfels_of_a_sphere_lie_on_it_and_face_the_eye() {
 
 #[test]
 fn a_frame_that_fails_leaves_the_surfels_of_the_one_before() {
-    let backends = [Backend::Cpu, Backend::Gpu].map(Renderer::with_backend);
-    for mut renderer in backends.into_iter().flatten() {
+    for mut renderer in crate::renderers() {
         renderer.render(&sphere(), &camera(), SIZE, &Settings::default()).expect("a picture");
         let before = renderer.surfels().expect("surfels");
         let mut settings = Settings::default();
