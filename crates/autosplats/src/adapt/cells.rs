@@ -1,4 +1,4 @@
-//! Screen points summed up in cells, coarse to fine.
+//! Screen points summed up in cells: the finest level is filled, coarser levels are merged from it.
 
 use std::ops::Range;
 

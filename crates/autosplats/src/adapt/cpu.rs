@@ -18,16 +18,15 @@ use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
 
 /// Surfels per task.
 const TASK: usize = 256;
-/// Standard error of a normal, in radians, that is good enough where the noise is many pixels.
+/// Standard error of a normal, in radians, that is good enough where the noise is at least [`TINY_PX`].
 pub(super) const GOOD_NORMAL_ERROR_RAD: f32 = 0.025;
-/// Noise level, in pixels, below which noise may be detail finer than pixels. Less noise allows a larger error.
+/// Noise level in pixels, in [`good_enough`], below which noise may be detail finer than pixels.
 pub(super) const TINY_PX: f32 = 0.5;
-/// Allowed error of a normal, in radians per pixel of noise below [`TINY_PX`], for k-radii of [`TINY_REACH_PX`].
+/// Added error in [`good_enough`], in radians per pixel that the noise is below [`TINY_PX`].
 pub(super) const TINY_SLOPE: f32 = 0.5;
-/// K-radius, in pixels, to which [`TINY_SLOPE`] applies. The allowed error grows with its squared ratio to the
-/// k-radius.
+/// K-radius in pixels, in [`good_enough`], at which density does not change the added error.
 pub(super) const TINY_REACH_PX: f32 = 2.0;
-/// Largest factor by which dense points raise the allowed error. In far views all detail looks like noise.
+/// Largest factor of density in [`good_enough`]. In far views points are dense and all detail looks like noise.
 pub(super) const MOST_TINY: f32 = 3.0;
 /// Largest standard error of a normal, in radians, with which the normal is held against others.
 pub(super) const MAX_RELIABLE_ERROR_RAD: f32 = 0.12;
@@ -142,6 +141,7 @@ impl Adapter {
         sheets.level = usual.sheet_level;
         let known = &known.seen_by(view);
         let task = Task { cells, density, view, rules, usual, known };
+        // A noisy surfel asks for the sheets of the cells around it, which are then fitted.
         let asks = |surfel: &&Surfel| matches!(task.call(surfel), RefitReason::Noise(_));
         let ask_all = |surfels: &[Surfel]| {
             let mut is_any = false;
@@ -217,6 +217,7 @@ impl Task<'_> {
         (known.map_or(measured, |known| known.noise), known)
     }
 
+    /// What a surfel calls for: whether and why larger balls replace its first neighbours.
     #[inline(always)]
     fn call(&self, surfel: &Surfel) -> RefitReason {
         // The standard error of the first plane is about noise over k-radius.
@@ -297,7 +298,9 @@ fn adapt_all_with<'a, S: Simd>(
     }
 }
 
-/// Standard error of a normal, in radians, at which no larger ball is needed.
+/// Standard error of a normal, in radians, at which no larger ball is needed: [`GOOD_NORMAL_ERROR_RAD`] +
+/// [`TINY_SLOPE`] · min(([`TINY_REACH_PX`] / k-radius)², [`MOST_TINY`]) · max([`TINY_PX`] - noise, 0), with k-radius
+/// and noise in pixels. Noise below [`TINY_PX`] may be fine detail, which larger balls would smooth away.
 #[inline(always)]
 pub(super) fn good_enough(noise: f32, k_radius: f32, depth: f32, view: &View) -> f32 {
     let pixel = view.pixel_size(depth);

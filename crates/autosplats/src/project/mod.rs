@@ -14,8 +14,8 @@
 //! A coarser grid, with about k screen points to a cell, counts points for the first search radius (§5.1). The grid
 //! also holds the nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
 //!
-//! All other points leave one bit each: the sixteenth of a pixel that they fall into. The splatting finds the borders
-//! of surfaces from these bits.
+//! Every point on the screen marks the sixteenth of its pixel that it falls into, with one bit that points there share.
+//! The splatting finds the borders of surfaces from these bits.
 
 mod cpu;
 mod device_cloud;

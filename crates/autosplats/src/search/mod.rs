@@ -16,8 +16,9 @@
 //! - *Bound*: a search ends at the largest radius r̃₀·1.25ⁱ, for whole i, whose sphere projects to a rectangle with at
 //!   most [`MAX_CANDIDATES`] screen points. If no rule ends the neighbourhood and the k-th neighbour lies beyond, P
 //!   keeps the neighbours within that radius and counts as *bounded*. The bound limits the time per point, even in a
-//!   cloud of outliers only. An engine may skip the bound where it reads fewer than [`MIN_CROWDED_CANDIDATES`] points.
-//!   Splat communication has no such bound; its number of iterations is limited instead.
+//!   cloud of outliers only. An engine that reads at most [`MIN_CROWDED_CANDIDATES`] points may skip the bound, which
+//!   then lies further out, as density does not rise eightfold in a step. Before it returns a k-th neighbour, it checks
+//!   that the next step holds at most [`MAX_CANDIDATES`] points. Splat communication limits its iterations instead.
 
 pub(crate) mod gpu;
 pub(crate) mod kd_tree;
@@ -111,11 +112,12 @@ pub(crate) struct Neighborhoods {
     pub(crate) counts: SearchCounts,
 }
 
-/// Numbers of points whose search ended early, by reason.
+/// Numbers of points whose search ended early, by reason. Reasons overlap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SearchCounts {
     pub(crate) outliers: usize,
     pub(crate) clamped: usize,
+    /// Each bounded point also counts as clamped, or as an outlier if it has no neighbour.
     pub(crate) bounded: usize,
 }
 

@@ -1,4 +1,5 @@
-//! Every engine against all pairwise distances in `f64`.
+//! The screen grid on the CPU against all pairwise distances in `f64`. Each engine's `gpu/tests.rs` compares the screen
+//! grid and splat communication on a GPU with this engine, and the kd-tree with brute force.
 
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DVec3, Vec3};

@@ -10,7 +10,8 @@
 //! hidden or not (`Sixteenths`). A pixel close to an empty square of three pixels is beside the surface if too few
 //! points lie on one side of its middle. Every line through the middle is tried. Close to a single empty pixel, which
 //! may be a gap between points, the open side must face that pixel too. Otherwise cores decide. Lines between cores
-//! alone would keep a row of tails between two cores that stand out of a border.
+//! alone would keep a row of tails between two cores that stand out of a border. See
+//! docs/decisions/0002-borders-by-sixteenths.md.
 //!
 //! Where points are few, close to an empty square, the mean of the splats around has to be near the pixel's middle.
 //! Noise scatters points past the border, while their splats are back on the surface. A surface that curves away has
@@ -18,7 +19,7 @@
 //! too, but more points are needed.
 //!
 //! Where noise blurs the border, the density of points decides before all these rules (`blurred`). See
-//! docs/decisions/0002-borders-by-sixteenths.md.
+//! docs/decisions/0003-borders-of-noise.md.
 // Differs from the paper: the paper draws all that its splats cover, so its silhouettes are too wide by their rims.
 
 pub(super) mod blurred;
@@ -351,6 +352,7 @@ fn open_side(points: u64) -> Option<[isize; 2]> {
     if !QUARTERS.iter().any(|&quarter| is_few(count(quarter))) {
         return None;
     }
+    // Number of directions to test: the finer ones only where many sixteenths are marked.
     let told = if all < FINE_DIRECTION_SIXTEENTHS { LINES.len() } else { ACROSS.len() };
     let sides = |back: usize| (0..told).map(move |at| (count(SIDES[at][back]), back, at));
     let (least, back, at) = sides(0).chain(sides(1)).min()?;

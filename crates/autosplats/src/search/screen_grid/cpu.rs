@@ -68,7 +68,7 @@ struct Scratch {
     squared: Vec<Lanes>,
     /// Squared distances of one lane, sorted.
     sorted: Vec<f32>,
-    /// Mean k-radius of the block before, in first search radii: a guess that does not change the result.
+    /// Expected k-radius in first search radii: the mean of the block before. A guess that does not change the result.
     reach: f32,
     /// Trust in the radii of the last frame.
     trust: Trust,
@@ -263,10 +263,10 @@ fn judge(task: &SearchInput, block: &Block, lane: usize, squared: &[f32], known:
     Verdict::Bounded(squared.partition_point(|&d| d <= bound * bound))
 }
 
-/// Lanes of `exact` whose neighbourhoods no rule can end early; the other lanes are judged one by one.
+/// Lanes of `exact` whose neighbourhoods certainly no rule ends early (`unruled`); the others are judged one by one.
 ///
 /// A gap is an annulus (b, √λ·b] without a point, with b ≥ r̃₀. Starting at b = r̃₀, the furthest point within √λ·b
-/// becomes the next b, until the k-radius is within reach. If there is no such point, there may be a gap, or no point
+/// becomes the next b, until √λ·b reaches the k-radius. If there is no such point, there may be a gap, or no point
 /// near. Adaptive rules have no further gaps.
 #[inline(always)]
 fn unruled<S: Simd>(
@@ -291,6 +291,7 @@ fn unruled<S: Simd>(
         base.0[lane] *= base.0[lane];
     }
     while open.contains(&true) {
+        // Squared: √λ·b. `base` is b².
         let reach = Lanes(base.0.map(|base| growth * base));
         for lane in 0..LANES {
             unruled[lane] |= open[lane] & (block.threshold.0[lane] <= reach.0[lane]);
@@ -309,6 +310,7 @@ fn unruled<S: Simd>(
 }
 
 impl Block {
+    /// A block of at most sixteen queries. `reach` is the expected k-radius in first search radii.
     #[inline(always)]
     fn new(task: &SearchInput, queries: &[u32], reach: f32, trust: &mut Trust) -> Self {
         let SearchInput { screen, view, rules, past } = *task;
@@ -344,7 +346,7 @@ impl Block {
         block
     }
 
-    /// Mean k-radius, in first search radii, of those of the first `lanes` lanes that found k neighbours.
+    /// The next [`Scratch::reach`]: mean k-radius, in first search radii, of those of the first `lanes` lanes that found k neighbours.
     #[inline(always)]
     fn reach(&self, lanes: usize, out: &NeighborhoodBlock, k: u32) -> f32 {
         let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32);
@@ -370,7 +372,7 @@ impl Block {
         screen.points.len() > MAX_CANDIDATES && window.candidates(&screen.cells) > MAX_CANDIDATES
     }
 
-    /// Largest radius that the search of a point may reach.
+    /// Radius of the bound on search work, world units; infinite without a bound.
     #[cold]
     fn bound_radius(&self, lane: usize, task: &SearchInput) -> f32 {
         let SearchInput { screen, view, .. } = *task;

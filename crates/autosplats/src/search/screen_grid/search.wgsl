@@ -32,17 +32,17 @@
 
 override MIN_RADIUS_GROWTH: f32;
 override OUTLIER_RADIUS_SLACK: f32;
-// Whether to search only the queries that `search_four` left.
+// Whether to search only the queries in `left`, whose searches `search_four` did not finish.
 override LEFT_ONLY: bool;
 
-// Rounds of loops after which a query counts as bounded. The limit is far below a software device's: such a device
+// Rounds of loops (`rounds` in shared/window_points.wgsl) after which a query counts as bounded. The limit is far below a software device's: such a device
 // runs several invocations together, each loop as long as the longest of them.
 const MAX_LOOP_ROUNDS = 25000u;
 
 var<workgroup> clamped: atomic<u32>;
 var<workgroup> bounded: atomic<u32>;
 
-// A window's points as seen by one query.
+// A window's points as seen by one query. `sure` names what the window certainly holds.
 struct WindowNeighbors {
     // Distance to the nearest neighbour.
     nearest: f32,
@@ -138,6 +138,7 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> Win
     return seen;
 }
 
+// Searches the neighbourhood of one query. `task`, the counts of the frame, is defined in shared/search_task.wgsl.
 fn find(query: u32, center: vec3f, initial_radius: f32) -> SearchResult {
     let strip_px = f32(task.strip_px);
     let outlier_radius = frame.outlier_growth * initial_radius;
@@ -175,7 +176,7 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> SearchResult {
             return SearchResult(kth_squared, false, false);
         }
 
-        // All neighbours up to this distance are known.
+        // Distance up to which the window certainly holds all neighbours.
         let sure = min(select(radius, MAX_F32, is_all), bound);
         seen = look_through(nearest, initial_radius, min(sure * sure, MAX_F32));
         let known = select(sure, kth_radius, is_exact);
