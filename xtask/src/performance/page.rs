@@ -11,7 +11,8 @@ const HEAD: &str = "\
 Written by `cargo xtask performance`. Changes here are lost.
 
 - `cargo xtask performance --machine NAME` measures the release build and writes `performance/NAME.json` and this page.
-- A result is the median of three runs that take turns; a run of a frame is the median of ten frames after a warm-up.
+- This command measures medians of three runs that take turns. A run of a frame is the median of ten frames after a
+  warm-up. A machine's line names what differs for its rows.
 - Machines are shared with other work: times vary by a third. Compare results of one machine and commit only.
 - Settings: *paper* is `-k 10 --points-per-pixel 1 --no-trim`; *noise* is `--noise 0.005` with the default settings.
 - Stages of a GPU are timed by the GPU. *picture* ends when the picture is in main memory.
@@ -51,6 +52,10 @@ pub(super) fn page(machines: &BTreeMap<String, Value>) -> String {
         let _ = writeln!(page, "- **{name}**: {machine}. Commit {commit}, {date}.");
     }
     for [title, about, words, numbers] in TABLES {
+        // A table without rows is left out.
+        if machines.values().all(|file| file[title].as_array().is_none_or(Vec::is_empty)) {
+            continue;
+        }
         let row = |first: &str, cell: &dyn Fn(&str) -> String| {
             let cells: Vec<_> = words.split(' ').chain(numbers.split(' ')).map(cell).collect();
             format!("| {first} | {} |\n", cells.join(" | "))
@@ -89,8 +94,8 @@ mod tests {
         let file = serde_json::json!({"machine": "a CPU", "commit": "abc", "date": "2026-01-02", "Reading": rows});
         let page = page(&BTreeMap::from([("one".to_owned(), file)]));
         let table = "| machine | format | ms | Mpoints/s |\n|---|---|--:|--:|\n\
-                     | one | ply | 7.06 | 12.8 |\n| one | laz | 73369 | – |\n\n## Memory";
-        assert!(page.contains(table), "{page}");
+                     | one | ply | 7.06 | 12.8 |\n| one | laz | 73369 | – |\n";
+        assert!(page.ends_with(table) && page.matches("\n## ").count() == 2, "no table without rows: {page}");
         assert!(page.contains("\n- **one**: a CPU. Commit abc, 2026-01-02.\n"), "{page}");
     }
 }
