@@ -8,9 +8,9 @@ use crate::first_radius::FirstRadius;
 /// Side that normals point to.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum OrientChoice {
-    /// To the sensor
+    /// To the sensor if the file states it, else up for terrain, else outward
     Auto,
-    /// To the sensor
+    /// To the sensor; fails if the file does not state it
     Sensor,
     /// Up, along z
     Up,

@@ -13,7 +13,7 @@ longest known extension counts, so `.pcd.bin` is not `.bin`.
 All readers:
 
 - Positions are 32-bit floats about an origin of whole numbers, which preserves survey coordinates for rendering.
-  `convert` reads and writes all digits.
+  `convert` also reads what the floats round off, and so writes all digits.
 - Attributes keep their bit width. Their names are PDAL's if PDAL has one (`Intensity`, `Classification`, `ReturnNumber`,
   `GpsTime`, `NormalX` …), else the file's.
 - Points at exactly (0, 0, 0), which scanners write for missing returns, are dropped and counted. Points without a
@@ -21,6 +21,9 @@ All readers:
 - Notes on standard error, and the `warnings` of `info`, state what is lost, guessed, dropped or scaled.
 - A header's counts are compared with the file's size before memory is allocated. A broken file gives a message of one
   line: the file, the position, what is wrong and the remedy.
+
+Recordings (MCAP, ROS 1 bags, folders of ROS 2) are played, as are animations of glTF: see *Points that move* in the
+[README](../README.md).
 ";
 
 /// Description of a format: what is kept and what is not.
@@ -91,7 +94,7 @@ pub(super) const FORMAT_TEXTS: &[FormatText] = &[
     FormatText {
         name: "glTF",
         kept: "GLB and glTF with embedded or neighbouring buffers: points and meshes in their scene positions; colours, normals; faces for `convert --sample`",
-        not_kept: "materials, textures, animation",
+        not_kept: "materials, textures; animation, which is played instead",
     },
 ];
 

@@ -125,7 +125,7 @@ be read are reported."
     /// and attributes
     #[arg(long)]
     pub(crate) scan: bool,
-    /// Print one JSON object on standard output, or an array of them for several inputs (fields: see --help)
+    /// Print one JSON object on standard output, or an array of them for several inputs (fields: below)
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]

@@ -9,15 +9,16 @@ use crate::values;
 
 pub(super) const INPUT_HELP: &str = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
-generated scene as scene:NAME[:COUNT], such as scene:herd:2M. For points that move: a folder, a quoted file pattern, a \
-recording (.mcap .bag), or - for PLY and PCD on standard input. Several inputs are merged.";
+generated scene as scene:NAME[:COUNT][@SECONDS], such as scene:herd:2M. SECONDS is the moment of an animated scene, as in \
+scene:figure@1.5. For points that move: a folder, a quoted file pattern, a recording (.mcap .bag), or - for PLY and PCD \
+on standard input. Several inputs are merged.";
 
 /// Pose, reading and playing of inputs.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct InputArgs {
-    /// Place INPUT with a pose from a text FILE: a row-major 4x4 or 3x4 matrix from input to world coordinates, or the
-    /// seven numbers tx ty tz qx qy qz qw
+    /// Place INPUT with a pose, from input to world coordinates, from a text FILE. The pose is a row-major 4x4 or 3x4
+    /// matrix, or the seven numbers tx ty tz qx qy qz qw
     #[arg(long = "pose", value_name = "INPUT=FILE")]
     pub(crate) poses: Vec<String>,
     #[command(flatten)]
@@ -30,14 +31,14 @@ pub(crate) struct InputArgs {
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Points that move")]
 pub(crate) struct PlayingArgs {
-    /// Frames per second: files of a sequence [default: 10], samples of a glTF or a scene [default: 30], pictures of a
-    /// film [default: the frames' own rate if even, else 30]. Sets the time between frames of a pipe in 'render'
+    /// Frames per second of a sequence of files, a glTF, a scene or a film; also of a pipe in 'render' [default: 10 for
+    /// files, 30 for glTF and scenes; for a film the frames' own rate if even, else 30]
     #[arg(long, value_name = "RATE", value_parser = values::rate)]
     pub(crate) fps: Option<f64>,
     /// Topic of a recording to play, can be repeated [default: all topics with points]
     #[arg(long = "topic", value_name = "NAME")]
     pub(crate) topics: Vec<String>,
-    /// Coordinate frame to transform the points of a recording or a zenoh:// stream to; streamed points that cannot be
+    /// Coordinate frame to transform the points of a recording or a zenoh:// stream to. Streamed points that cannot be
     /// transformed are refused [default: topmost frame of the sensors]
     #[arg(long, value_name = "FRAME")]
     pub(crate) fixed_frame: Option<String>,

@@ -13,8 +13,8 @@ use crate::values::{self, Neighbors, Ortho};
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArgs {
-    /// Side to look from, with all points but far outliers in the picture [default: chosen from the data: the camera's
-    /// own view for depth images, just behind the sensor for sweeps, the side that sensors saw, otherwise iso]
+    /// Side to look from, with all points but far outliers in the picture [default: the camera's own view for depth
+    /// images, just behind the sensor for sweeps, else the side that sensors saw, else iso]
     #[arg(long, value_enum, conflicts_with_all = ["eye", "camera"])]
     pub(crate) view: Option<Side>,
     /// Position of the eye in world coordinates
@@ -140,8 +140,8 @@ pub(crate) struct LookArgs {
     /// Show colours without lighting
     #[arg(long)]
     pub(crate) no_lighting: bool,
-    /// Brightness factor on the points' own colours where they are lit, 0.01 to 100 [default: 1, up to 8 if all colours
-    /// are dark; the first picture decides for all]
+    /// Brightness factor on the points' own colours where they are lit, 0.01 to 100. The first picture decides for all
+    /// [default: 1, up to 8 if all colours are dark]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub(crate) exposure: Option<f32>,
     /// Strength of occlusion, which darkens creases and surfaces behind others, 0 (off) to 10

@@ -42,8 +42,8 @@ pub(crate) struct RenderArgs {
     /// Width and height of the picture in pixels, each 1 to 16384
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
     pub(crate) size: [u32; 2],
-    /// Render FACTOR times as wide and high and average down, 1 to 8: smoother and finer .png pictures [default: 2 for
-    /// stills of up to 1920x1080 pixels; 1 for larger ones, frames and .exr layers]
+    /// Render FACTOR times as wide and high and average down, 1 to 8. This makes .png pictures smoother and finer
+    /// [default: 2 for stills of up to 1920x1080 pixels; 1 for larger ones, frames and .exr layers]
     #[arg(long, value_name = "FACTOR", value_parser = clap::value_parser!(u32).range(1..=8))]
     pub(crate) supersample: Option<u32>,
     /// Frames to render, counted from 0, both ends included: 0..99, 50.., ..9 or 7; of live input, updates as they

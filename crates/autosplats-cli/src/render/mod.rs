@@ -121,7 +121,11 @@ fn check_visible(frame: &Frame<'_>, job: &Job) -> Result<(), Failure> {
     }
     let Counts { points, not_finite, behind, outside, visible, .. } = frame.counts;
     let why = if visible > 0 {
-        format!("none of the {visible} visible points has a neighbour near enough; --keep-outliers shows them as dots")
+        let (which, them) = match visible {
+            1 => ("the only visible point has no".to_owned(), "it as a dot"),
+            _ => (format!("none of the {visible} visible points has a"), "them as dots"),
+        };
+        format!("{which} neighbour near enough; --keep-outliers shows {them}")
     } else {
         format!(
             "of {points} points {not_finite} have no finite position, {behind} are behind the eye, {outside} outside the \

@@ -20,7 +20,8 @@ pub(super) fn drop_far(job: &Job<'_>, cloud: &mut PointCloud) {
     let kept: Vec<Scan> = cloud.scans.iter().filter(|scan| !is_far(cloud, scan)).cloned().collect();
     let count = cloud.scans.len() - kept.len();
     if count > 0 {
-        job.note(format!("{count} sensor positions are far from all that was seen; treated as unknown"));
+        let what = if count == 1 { "sensor position is" } else { "sensor positions are" };
+        job.note(format!("{count} {what} far from all that was seen; treated as unknown"));
         cloud.scans = kept;
     }
 }

@@ -291,7 +291,7 @@ fn unruled<S: Simd>(
         base.0[lane] *= base.0[lane];
     }
     while open.contains(&true) {
-        // Squared: √λ·b. `base` is b².
+        // The square of √λ·b; `base` is b².
         let reach = Lanes(base.0.map(|base| growth * base));
         for lane in 0..LANES {
             unruled[lane] |= open[lane] & (block.threshold.0[lane] <= reach.0[lane]);
@@ -346,7 +346,8 @@ impl Block {
         block
     }
 
-    /// The next [`Scratch::reach`]: mean k-radius, in first search radii, of those of the first `lanes` lanes that found k neighbours.
+    /// The next [`Scratch::reach`]: mean k-radius, in first search radii, of the first `lanes` lanes, counting only
+    /// those that found k neighbours.
     #[inline(always)]
     fn reach(&self, lanes: usize, out: &NeighborhoodBlock, k: u32) -> f32 {
         let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32);

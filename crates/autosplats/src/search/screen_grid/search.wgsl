@@ -35,8 +35,8 @@ override OUTLIER_RADIUS_SLACK: f32;
 // Whether to search only the queries in `left`, whose searches `search_four` did not finish.
 override LEFT_ONLY: bool;
 
-// Rounds of loops (`rounds` in shared/window_points.wgsl) after which a query counts as bounded. The limit is far below a software device's: such a device
-// runs several invocations together, each loop as long as the longest of them.
+// Rounds of loops (`rounds` in shared/window_points.wgsl) after which a query counts as bounded. The limit is far below
+// a software device's: such a device runs several invocations together, each loop as long as the longest of them.
 const MAX_LOOP_ROUNDS = 25000u;
 
 var<workgroup> clamped: atomic<u32>;
