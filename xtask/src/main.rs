@@ -1,6 +1,7 @@
 //! The project's own tasks. `cargo xtask test` is everything CI runs.
 
 mod formats;
+mod lanes;
 mod layers;
 mod lengths;
 mod machine;

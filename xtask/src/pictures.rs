@@ -6,13 +6,12 @@ use std::fmt::Write as _;
 use std::fs::{create_dir_all, read, read_dir, read_to_string, write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use sha2::{Digest as _, Sha256};
 
 use crate::build_command;
+use crate::lanes::in_lanes;
 
 /// The file of hashes: a line per output, `HASH NAME`, or `exit CODE NAME` for a command that fails.
 const HASHES: &str = "hashes.txt";
@@ -132,24 +131,14 @@ fn render(program: &Path, data: &Path, out: &Path) -> Result<()> {
     let out = &out.canonicalize()?;
     ensure!(read_dir(out)?.next().is_none(), "{} is not empty: old pictures would be hashed too", out.display());
     let cases = cases(data)?;
-    let next = AtomicUsize::new(0);
-    let failed = Mutex::new(BTreeMap::new());
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..PROCESSES)
-            .map(|_| {
-                scope.spawn(|| -> Result<()> {
-                    while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let code = run_case(program, data, out, case)?;
-                        if code != 0 {
-                            failed.lock().expect("no worker panics").insert(case.name.clone(), code);
-                        }
-                    }
-                    Ok(())
-                })
-            })
-            .collect();
-        workers.into_iter().try_for_each(|worker| worker.join().expect("no worker panics"))
-    })?;
+    let codes = in_lanes(PROCESSES, &cases, |case| run_case(program, data, out, case));
+    let mut failed = BTreeMap::new();
+    for (case, code) in cases.iter().zip(codes) {
+        match code? {
+            0 => {}
+            code => drop(failed.insert(case.name.clone(), code)),
+        }
+    }
 
     let mut hashes = String::new();
     let mut files: Vec<_> = read_dir(out)?.collect::<Result<_, _>>()?;
@@ -159,7 +148,6 @@ fn render(program: &Path, data: &Path, out: &Path) -> Result<()> {
         let hex = digest.iter().fold(String::new(), |text, byte| format!("{text}{byte:02x}"));
         let _ = writeln!(hashes, "{hex} {}", file.file_name().display());
     }
-    let failed = failed.into_inner().expect("no worker panics");
     for backend in ["cpu ", "gpu "] {
         let made = files.iter().any(|file| file.file_name().to_string_lossy().starts_with(backend));
         ensure!(made, "no {backend}picture was made; a GPU's need a driver, and software Vulkan will do");

@@ -5,14 +5,13 @@ use std::fs::File;
 use std::io::{Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use serde_json::Value;
 
+use crate::lanes::in_lanes;
 use crate::{FEATURES, cargo_command};
 
 /// Programs that run at a time.
@@ -85,23 +84,12 @@ impl Programs {
 
     /// Runs all of them, prints what each says when it ends, and fails if any did.
     pub(crate) fn run(&self) -> Result<()> {
-        let next = AtomicUsize::new(0);
-        let outcomes = Mutex::new(Vec::new());
-        thread::scope(|scope| {
-            for _ in 0..LANES {
-                scope.spawn(|| {
-                    while let Some(program) = self.tests.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let start = Instant::now();
-                        let output = program.run();
-                        let mut outcomes = outcomes.lock().expect("no lane panics");
-                        outcomes.push((&program.name, tell(&program.name, output, start.elapsed().as_secs_f64())));
-                    }
-                });
-            }
+        let outcomes = in_lanes(LANES, &self.tests, |program| {
+            let start = Instant::now();
+            let output = program.run();
+            (program.name.as_str(), tell(&program.name, output, start.elapsed().as_secs_f64()))
         });
-        let outcomes = outcomes.into_inner().expect("no lane panics");
-        ensure!(outcomes.len() == self.tests.len(), "a lane ended early");
-        let failed: Vec<&str> = outcomes.iter().filter(|(_, passed)| !passed).map(|(name, _)| name.as_str()).collect();
+        let failed: Vec<&str> = outcomes.iter().filter(|(_, passed)| !passed).map(|(name, _)| *name).collect();
         if !failed.is_empty() {
             bail!("failed: {}", failed.join(", "));
         }
@@ -144,6 +132,8 @@ impl Program {
 
 /// Prints what a program said, and returns whether it passed.
 fn tell(name: &str, output: Result<Output>, seconds: f64) -> bool {
+    // Held, so that what two programs say is not mixed.
+    let _out = std::io::stdout().lock();
     println!("\n-- {name}: {seconds:.1} s");
     match output {
         Ok(output) => {

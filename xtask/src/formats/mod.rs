@@ -13,10 +13,14 @@ use std::process::{Command, Stdio};
 use anyhow::{Context as _, Result, bail, ensure};
 use serde_json::Value;
 
+use crate::lanes::in_lanes;
 use crate::{FEATURES, cargo_command};
 
 use self::outcome::{FileOutcome, FileRow};
 use self::words::{FILES_TEXT, FORMAT_TEXTS, HEAD_TEXT};
+
+/// Files that are looked at beside each other.
+const PROCESSES: usize = 2;
 
 /// The document, from the repository's root.
 const DOCUMENT: &str = "docs/FORMATS.md";
@@ -132,21 +136,26 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
     let pictures = tempfile::tempdir()?;
     let mut rows: Vec<FileRow> = Vec::new();
     let mut others: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    let total = names.len();
-    for (number, name) in names.into_iter().enumerate() {
-        println!("{:>4} of {total}  {name}", number + 1);
-        let base = name.rsplit('/').next().unwrap_or(&name);
-        if let Some((_, about)) =
-            COMPANION_FILES.iter().find(|(part, _)| base.starts_with(part) || base.ends_with(part))
-        {
-            others.entry((*about).to_owned()).or_default().push(name);
-            continue;
+    let companion = |name: &str| {
+        let base = name.rsplit('/').next().unwrap_or(name);
+        COMPANION_FILES.iter().find(|(part, _)| base.starts_with(part) || base.ends_with(part)).map(|(_, about)| *about)
+    };
+    let is_recording = |name: &str| name.ends_with(".mcap") && !name.contains("lfs");
+    let outcomes = in_lanes(PROCESSES, &names, |name| {
+        if companion(name).is_some() || is_recording(name) {
+            return Ok(None);
         }
-        let outcome = FileOutcome::of(program, data, &name, &pictures.path().join("picture.png"))?;
-        if name.ends_with(".mcap") && !name.contains("lfs") {
-            others.entry("recordings (played)".into()).or_default().push(name);
+        println!("{name}");
+        // Each lane needs a picture of its own.
+        let picture = pictures.path().join(format!("{}.png", name.replace('/', "_")));
+        FileOutcome::of(program, data, name, &picture).map(Some)
+    });
+    for (name, outcome) in names.into_iter().zip(outcomes) {
+        let Some(outcome) = outcome? else {
+            let about = companion(&name).unwrap_or("recordings (played)");
+            others.entry(about.to_owned()).or_default().push(name);
             continue;
-        }
+        };
         match rows.last_mut().filter(|row| row.continues(&name, &outcome)) {
             Some(row) => row.add(&name, &outcome),
             None => rows.push(FileRow::new(name, outcome)),
