@@ -57,8 +57,8 @@ pub(crate) fn everything(root: &Path) -> Result<()> {
     steps.step("lints", || {
         cargo(root, &[&["clippy", "--locked", "--workspace"][..], &FEATURES, &["--all-targets"], &deny].concat())
     })?;
-    // What is there only without Zenoh or without the window. Of the whole workspace, so that dependencies have the same
-    // features and are not checked again.
+    // What is there only without Zenoh or without the window. Of the whole workspace, so that dependencies have the
+    // same features and are not checked again.
     steps.step("lints without Zenoh and without the window", || {
         cargo(root, &[&["clippy", "--locked", "--workspace", "--no-default-features"][..], &deny].concat())
     })?;
