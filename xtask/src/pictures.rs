@@ -79,7 +79,7 @@ const SETTINGS: &[&str] = &[
 /// How many of [`VARIED`] a GPU renders: on a software device a picture takes seconds.
 const VARIED_ON_GPU: usize = 2;
 
-/// Engines that only a GPU has. The first radius is given: the best one is found by time, which differs from run to run.
+/// Engines that only a GPU has. The first radius is given, because the best one is found by time.
 const GPU_ENGINES: [&str; 2] = ["-k 10 --engine splat-communication", "-k 10 --engine kd-tree --first-radius 0.05"];
 
 /// Points that move: frames of one run look back at each other.
