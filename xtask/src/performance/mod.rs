@@ -1,5 +1,5 @@
-//! `cargo xtask performance`: measures the release command into a file of `docs/performance/`, and writes
-//! `docs/PERFORMANCE.md` from all files there.
+//! `cargo xtask performance`: measures the command, built with the profile `dist`, into a file of `docs/performance/`,
+//! and writes `docs/PERFORMANCE.md` from all files there.
 
 mod measure;
 mod page;

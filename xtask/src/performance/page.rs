@@ -10,7 +10,7 @@ const HEAD: &str = "\
 
 Written by `cargo xtask performance`. Changes here are lost.
 
-- `cargo xtask performance --machine NAME` measures the release build and writes `performance/NAME.json` and this page.
+- `cargo xtask performance --machine NAME` measures the `dist` build and writes `performance/NAME.json` and this page.
 - This command measures medians of three runs that take turns. A run of a frame is the median of ten frames after a
   warm-up. A machine's line names what differs for its rows.
 - Machines are shared with other work: times vary by a third. Compare results of one machine and commit only.

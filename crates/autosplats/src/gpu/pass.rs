@@ -50,11 +50,11 @@ impl PassSource {
 /// The compute passes that a device has compiled. Constants are settings with few values, so their number is bounded.
 pub(super) type CompiledPasses = HashMap<PassKey, Pass>;
 
-/// What a pass is compiled from. Sources are static, so their address tells them apart.
+/// What a pass is compiled from: its code before linking, and the values of its overrides, as bits.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct PassKey {
     path: &'static str,
-    source: usize,
+    source: &'static str,
     constants: Vec<(String, u64)>,
 }
 
@@ -74,11 +74,8 @@ impl Pass {
     /// [`Error::Device`] if the device lacks a feature or refuses the shader.
     pub(crate) fn new(gpu: &Gpu, source: &PassSource, constants: &[(&str, f64)]) -> Result<Self, Error> {
         let constant = |&(name, value): &(&str, f64)| (name.to_owned(), value.to_bits());
-        let key = PassKey {
-            source: source.source.as_ptr().addr(),
-            path: source.path,
-            constants: constants.iter().map(constant).collect(),
-        };
+        let key =
+            PassKey { source: source.source, path: source.path, constants: constants.iter().map(constant).collect() };
         let lock = || gpu.compiled.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pass) = lock().get(&key) {
             gpu.check_lost()?;
