@@ -13,7 +13,7 @@ use x11rb::protocol::xproto::{
 use x11rb::rust_connection::RustConnection;
 
 /// Longest time of a step on a busy machine.
-const STEP_TIMEOUT: Duration = Duration::from_secs(120);
+const STEP_TIMEOUT: Duration = Duration::from_secs(300);
 /// Time between two screenshots.
 const SCREENSHOT_INTERVAL: Duration = Duration::from_millis(400);
 
@@ -231,8 +231,8 @@ impl Screen {
         Picture { width: width.into(), pixels }
     }
 
-    /// Waits until the screen shows what `is` accepts and two screenshots are equal. Saves the picture. Panics after
-    /// `STEP_TIMEOUT`.
+    /// Waits until the screen shows what `is` accepts, two screenshots are equal, and the program hardly computes between
+    /// them: while it does, a finer picture follows. Saves the picture. Panics after `STEP_TIMEOUT`.
     pub(crate) fn settled(&mut self, name: &str, is: impl Fn(&Picture) -> bool) -> Picture {
         self.wait(name, STEP_TIMEOUT, is).unwrap_or_else(|| panic!("step '{name}' is not seen after {STEP_TIMEOUT:?}"))
     }
@@ -240,18 +240,29 @@ impl Screen {
     /// Like [`settled`](Self::settled), but returns `None` after `time`.
     pub(crate) fn wait(&mut self, name: &str, time: Duration, is: impl Fn(&Picture) -> bool) -> Option<Picture> {
         let start = Instant::now();
-        let mut last = self.look();
+        let (mut last, mut computed) = (self.look(), self.computing_time());
         loop {
             std::thread::sleep(SCREENSHOT_INTERVAL);
             self.check_alive();
-            let now = self.look();
-            let done = now == last && is(&now);
+            let (now, computed_now) = (self.look(), self.computing_time());
+            let rests = computed_now.saturating_sub(computed) < SCREENSHOT_INTERVAL / 4;
+            let done = now == last && rests && is(&now);
             if done || start.elapsed() > time {
                 now.write(&self.pictures.join(format!("{name}.png")));
                 return done.then_some(now);
             }
-            last = now;
+            (last, computed) = (now, computed_now);
         }
+    }
+
+    /// Processor time that the program has used so far, on all its threads; zero once it has ended.
+    fn computing_time(&self) -> Duration {
+        let Some(program) = &self.program else { return Duration::ZERO };
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", program.id())).unwrap_or_default();
+        // The name, in parentheses, may hold spaces. Fields 14 and 15 are user and system time in hundredths.
+        let fields = stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace();
+        let hundredths = fields.skip(11).take(2).filter_map(|field| field.parse::<u64>().ok()).sum::<u64>();
+        Duration::from_millis(10 * hundredths)
     }
 
     /// Sends XTEST's FakeInput. The request is encoded here because the window's x11rb is built without the feature for
