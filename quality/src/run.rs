@@ -32,7 +32,8 @@ pub struct Outcome {
 pub struct Motion {
     /// Change of the true pictures. The light moves with the camera, and details finer than pixels flicker.
     pub truth: Change,
-    /// Change of lightness in true pictures of 16 rays per pixel, in 255ths. Their details do not flicker.
+    /// Change of lightness in true pictures of 16 rays per pixel, in 255ths. Their details do not flicker. NaN if only
+    /// one ray was traced.
     pub smooth: f64,
     /// Change of each method's pictures. Ours use earlier pictures, as in the window while the view moves. See
     /// docs/decisions/0014-frame-to-frame.md.
@@ -74,12 +75,22 @@ pub fn measure(
     }
     let lit = drawn.iter().map(|(method, _, lit)| (*method, lit));
     let still = still::measure(case, subject, painter, &truth, lit)?;
-    let motion = if case.motion { Some(movement(case, subject, painter, methods)?) } else { None };
+    let motion = if case.motion { Some(movement(case, subject, painter, methods, true)?) } else { None };
     Ok((Outcome { case: *case, measures, still, motion }, Pictures { truth, drawn }))
 }
 
-/// Measures changes while the camera of a case moves around its subject.
-fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: &[Method]) -> Result<Motion> {
+/// Measures changes while the camera of a case moves around its subject. `smooth`: also those of true pictures of 16 rays
+/// per pixel, which take most of the time.
+///
+/// # Errors
+/// An invalid camera, or an error of the renderer.
+pub fn movement(
+    case: &Case,
+    subject: &Subject,
+    painter: &mut Painter<'_>,
+    methods: &[Method],
+    smooth: bool,
+) -> Result<Motion> {
     let camera = case.shot.camera(subject, case.size)?;
     let methods: Vec<_> = methods.iter().copied().filter(|method| !matches!(method, Method::Fit(_))).collect();
     // A renderer of its own: what it keeps of earlier pictures must be of the same settings.
@@ -98,8 +109,9 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
             let lit = Lit::new(&picture, &exact.rays);
             (picture, lit)
         };
-        let smooth = still::smooth(subject, &camera, case.size)?;
-        let mut pictures = vec![lit(true_picture.clone()), (true_picture, smooth)];
+        let truth = lit(true_picture.clone());
+        let fine = if smooth { (true_picture, still::smooth(subject, &camera, case.size)?) } else { truth.clone() };
+        let mut pictures = vec![truth, fine];
         pictures.push(lit(painter.paint(Method::Ours, &camera, case.size)?));
         for &method in &methods {
             pictures.push(match method {
@@ -123,12 +135,12 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
     let last_normal_errors =
         before.map_or([f64::NAN; 2], |(_, shown)| [2, ours].map(|at| last_normal_errors(shown.get(at))));
     let mut means = changes.iter().map(Changes::mean);
-    let (Some(truth), Some(smooth), Some(alone)) = (means.next(), means.next(), means.next()) else {
+    let (Some(truth), Some(fine), Some(alone)) = (means.next(), means.next(), means.next()) else {
         unreachable!("there are at least three changes")
     };
     Ok(Motion {
         truth,
-        smooth: smooth.lightness,
+        smooth: if smooth { fine.lightness } else { f64::NAN },
         methods: methods.into_iter().zip(means).collect(),
         alone,
         last_normal_errors,

@@ -14,7 +14,7 @@ use autosplats_quality::method::{Method, Painter};
 use autosplats_quality::motion::{Change, Changes, same};
 use autosplats_quality::picture::{DrawnSurface, Picture};
 use autosplats_quality::random::Random;
-use autosplats_quality::run::{Pictures, measure};
+use autosplats_quality::run::{Outcome, Pictures, measure, movement};
 use autosplats_quality::still::Still;
 use autosplats_quality::subject::Subject;
 
@@ -50,6 +50,8 @@ struct Limits {
 }
 
 const NO_LIMIT: f64 = f64::NAN;
+const NOISE: &str = "bumpy:200K-noise0.3% front";
+const OUTLIERS: &str = "bumpy:200K-outliers2% front";
 
 /// One line for each case: measured values with a few percent to spare. Better pictures call for tighter limits.
 #[rustfmt::skip]
@@ -125,28 +127,48 @@ fn a_still_that_gains_less_is_found() {
     }
 }
 
-fn limits_of(case: &Case) -> &'static Limits {
-    LIMITS.iter().find(|limits| limits.case == case.name()).expect("every case has limits")
+/// A case with its pictures.
+struct Measured {
+    case: Case,
+    subject: Subject,
+    limits: &'static Limits,
+    outcome: Outcome,
+    pictures: Pictures,
 }
 
-/// Measures a case and checks its limits.
+/// Measures a case once for all tests, without motion.
+fn measured(name: &str) -> &'static Measured {
+    static MEASURED: [OnceLock<Measured>; LIMITS.len()] = [const { OnceLock::new() }; LIMITS.len()];
+    let at = LIMITS.iter().position(|limits| limits.case == name).expect("a case of this name");
+    MEASURED[at].get_or_init(|| {
+        let case = Case { motion: false, ..quick()[at] };
+        let subject = Subject::new(case.recipe).expect("a subject");
+        let others: &[Method] = match name {
+            NOISE => &[Method::Paper, Method::Known],
+            OUTLIERS => &[Method::Paper],
+            _ => &[],
+        };
+        let fits = Method::ALL.into_iter().filter(|method| matches!(method, Method::Fit(_)));
+        let methods: Vec<_> = [Method::Ours].into_iter().chain(fits).chain(others.iter().copied()).collect();
+        let (outcome, pictures) = measure(&case, &subject, &mut Painter::new(&subject), &methods).expect("measures");
+        Measured { case, subject, limits: &LIMITS[at], outcome, pictures }
+    })
+}
+
+/// Checks the limits of a case.
 fn check_limits(name: &str) {
-    let case = quick().into_iter().find(|case| case.name() == name).expect("a case of this name");
-    let limits = limits_of(&case);
-    let subject = Subject::new(case.recipe).expect("a subject");
-    let mut painter = Painter::new(&subject);
-    let methods: Vec<_> =
-        Method::ALL.into_iter().filter(|method| matches!(method, Method::Ours | Method::Fit(_))).collect();
-    let (outcome, _) = measure(&case, &subject, &mut painter, &methods).expect("a measured case");
+    let Measured { case, subject, limits, outcome, .. } = measured(name);
     let measures = outcome.of(Method::Ours).expect("our picture");
     let values: [fn(&Angles) -> f64; 2] = [|angles| angles.mean, |angles| angles.band];
     let ratios = values.map(|value| outcome.over_best_fit(Method::Ours, value).expect("plane fits"));
-    println!("{name}: {measures:.3?}\n{ratios:.3?}\n{:.3?}", outcome.motion);
+    println!("{name}: {measures:.3?}\n{ratios:.3?}");
     let mut found = misses(measures, limits);
     found.extend(ratio_misses(ratios, limits));
     let Still { still, methods, .. } = &outcome.still;
     found.extend(still_misses(still - methods[0].1, limits));
-    if let Some(motion) = &outcome.motion {
+    if quick().iter().any(|case| case.name() == name && case.motion) {
+        let motion = movement(case, subject, &mut Painter::new(subject), &[Method::Ours], false).expect("a movement");
+        println!("{motion:.3?}");
         found.extend(motion_misses(motion.methods[0].1, motion.truth, limits));
     }
     assert!(found.is_empty(), "{name}: limits missed:\n{}", found.join("\n"));
@@ -184,12 +206,12 @@ fn bumpy_uneven() {
 
 #[test]
 fn bumpy_with_noise() {
-    check_limits("bumpy:200K-noise0.3% front");
+    check_limits(NOISE);
 }
 
 #[test]
 fn bumpy_with_outliers() {
-    check_limits("bumpy:200K-outliers2% front");
+    check_limits(OUTLIERS);
 }
 
 #[test]
@@ -200,12 +222,9 @@ fn herd_swept() {
 /// The paper's settings, which do not adapt to noise, miss the limits.
 #[test]
 fn the_papers_settings_are_not_enough_for_noise() {
-    for name in ["bumpy:200K-noise0.3% front", "bumpy:200K-outliers2% front"] {
-        let case = Case { motion: false, ..quick().into_iter().find(|case| case.name() == name).expect("this case") };
-        let subject = Subject::new(case.recipe).expect("a subject");
-        let mut painter = Painter::new(&subject);
-        let (outcome, _) = measure(&case, &subject, &mut painter, &[Method::Paper]).expect("a measured case");
-        let found = misses(outcome.of(Method::Paper).expect("a picture"), limits_of(&case)).join("\n");
+    for name in [NOISE, OUTLIERS] {
+        let Measured { limits, outcome, .. } = measured(name);
+        let found = misses(outcome.of(Method::Paper).expect("a picture"), limits).join("\n");
         notices(&found, &["normals:", "normals near silhouettes:", "before", "IoU", "PSNR", "FLIP"]);
     }
 }
@@ -213,11 +232,7 @@ fn the_papers_settings_are_not_enough_for_noise() {
 /// [`Method::Known`] shows what exact normals and places can reach, so it must be near the truth.
 #[test]
 fn what_is_known_is_nearly_the_truth() {
-    let name = "bumpy:200K-noise0.3% front";
-    let case = Case { motion: false, ..quick().into_iter().find(|case| case.name() == name).expect("this case") };
-    let subject = Subject::new(case.recipe).expect("a subject");
-    let mut painter = Painter::new(&subject);
-    let (outcome, _) = measure(&case, &subject, &mut painter, &[Method::Ours, Method::Known]).expect("a measured case");
+    let outcome = &measured(NOISE).outcome;
     let [ours, known] = [Method::Ours, Method::Known].map(|method| outcome.of(method).expect("a picture"));
     let [far, near] = [ours, known].map(|measures| measures.angles.expect("normals").mean);
     assert!(near < 1.0 && near < 0.2 * far, "errors of normals are {near}°, ours {far}°");
@@ -231,24 +246,11 @@ fn every_case_has_its_line() {
 }
 
 /// A good picture to spoil.
-struct GoodPicture {
-    subject: Subject,
-    limits: &'static Limits,
-    pictures: Pictures,
+fn sample() -> &'static Measured {
+    measured("bumpy:200K front")
 }
 
-fn sample() -> &'static GoodPicture {
-    static SAMPLE: OnceLock<GoodPicture> = OnceLock::new();
-    SAMPLE.get_or_init(|| {
-        let case = quick().into_iter().find(|case| case.name() == "bumpy:200K front").expect("this case");
-        let subject = Subject::new(case.recipe).expect("a subject");
-        let mut painter = Painter::new(&subject);
-        let (_, pictures) = measure(&case, &subject, &mut painter, &[Method::Ours]).expect("a measured case");
-        GoodPicture { subject, limits: limits_of(&case), pictures }
-    })
-}
-
-impl GoodPicture {
+impl Measured {
     fn picture(&self) -> &Picture {
         &self.pictures.drawn[0].1
     }
@@ -336,11 +338,7 @@ fn what_plane_fits_do_better_is_noticed() {
 
 #[test]
 fn what_is_open_or_closed_wrongly_between_rings_is_noticed() {
-    let case = quick().into_iter().find(|case| case.name() == "herd:32x1024 behind").expect("this case");
-    let subject = Subject::new(case.recipe).expect("a subject");
-    let mut painter = Painter::new(&subject);
-    let (_, pictures) = measure(&case, &subject, &mut painter, &[Method::Ours]).expect("a measured case");
-    let sample = GoodPicture { subject, limits: limits_of(&case), pictures };
+    let sample = measured("herd:32x1024 behind");
     assert_eq!(sample.misses(sample.picture()), "", "the rest needs a good picture");
     notices(&sample.misses_of_spoilt(20, |_| None), &["closed"]);
     let back = |shown: DrawnSurface| Some(DrawnSurface { depth: shown.depth + 0.3 * sample.subject.diagonal, ..shown });
