@@ -8,10 +8,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use autosplats_cloud::glam::{DMat4, DVec3};
-use autosplats_cloud::{
-    Error, LatestOptions, Live, PlayOptions, Player, PointCloud, Progress, ReadOptions, Scene, Source, beginnings,
-    check_memory, read_mesh, sample_surface,
-};
+use autosplats_cloud::{Error, PointCloud, Progress, check_memory, sample_surface};
+use autosplats_formats::{ReadOptions, read_mesh};
+use autosplats_scenes::Scene;
+use autosplats_sources::{LatestOptions, Live, PlayOptions, Player, Source, beginnings};
 use rayon::prelude::*;
 
 use self::pose::read_pose;

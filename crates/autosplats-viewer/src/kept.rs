@@ -3,8 +3,10 @@
 use std::path::Path;
 use std::time::Duration;
 
+use autosplats::cloud::Error;
 use autosplats::cloud::glam::DMat4;
-use autosplats::cloud::{DepthCamera, Error, LatestOptions, PlayOptions, ReadOptions};
+use autosplats_formats::{DepthCamera, ReadOptions};
+use autosplats_sources::{LatestOptions, PlayOptions};
 use serde::{Deserialize, Serialize};
 
 use crate::app::App;

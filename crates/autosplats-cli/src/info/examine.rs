@@ -5,10 +5,10 @@ use std::sync::{Mutex, PoisonError};
 
 use autosplats::guess_axes;
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{
-    Attribute, Description, Error, FieldValues, PlayOptions, PointCloud, Progress, ReadOptions, RecordingSummary,
-    Scene, Source, Unit, check_memory, describe, describe_recording, read_with,
-};
+use autosplats_cloud::{Error, FieldValues, PointCloud, Progress, Unit, check_memory};
+use autosplats_formats::{Attribute, Description, ReadOptions, describe, read_with};
+use autosplats_scenes::Scene;
+use autosplats_sources::{PlayOptions, RecordingSummary, Source, describe_recording};
 use rayon::prelude::*;
 
 use super::report::{AttributeFound, AxesFound, Bounds, CrsFound, Detail, Report, ScanFound};

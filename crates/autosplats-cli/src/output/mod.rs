@@ -8,7 +8,8 @@ use std::fs::{File, metadata};
 use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write, stdout};
 use std::path::{Path, PathBuf};
 
-use autosplats_cloud::{Error, PointCloud, check_writable};
+use autosplats_cloud::{Error, PointCloud};
+use autosplats_formats::check_writable;
 use tempfile::NamedTempFile;
 
 pub(crate) use self::exr::write_exr;
@@ -91,7 +92,7 @@ pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, quiet: bool) -> Resul
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let bar = Bar::on_file("writing", path, quiet);
     let _writing = interrupt::writing();
-    match autosplats_cloud::write(cloud, &target, &bar) {
+    match autosplats_formats::write(cloud, &target, &bar) {
         Ok(()) => metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
         Err(Error::Cancelled) => Err(Failure::interrupted()),
         Err(Error::Io { source, .. }) => Err(cannot_write(path, &source)),

@@ -1,6 +1,6 @@
 //! Coordinate systems.
 
-pub(crate) mod geotiff;
+mod geotiff;
 mod wkt;
 
 /// The coordinate system that a file states. Readers do not convert coordinates.
@@ -35,24 +35,25 @@ pub use self::geotiff::GeoKeys;
 
 /// What a definition of a coordinate system states.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Found {
-    pub(crate) crs: Crs,
+pub struct CrsDefinition {
+    /// The coordinate system.
+    pub crs: Crs,
     /// Whether coordinates are geocentric: measured from the centre of the earth.
-    pub(crate) geocentric: bool,
+    pub geocentric: bool,
     /// Unit of z, if stated, even if it is the unit of x and y.
-    pub(crate) heights: Option<Unit>,
+    pub heights: Option<Unit>,
 }
 
 impl Crs {
     /// Parses well-known text of version 1 or 2. Text that cannot be parsed is kept in `wkt`.
     pub fn from_wkt(text: &str) -> Self {
-        Found::from_wkt(text).crs
+        CrsDefinition::from_wkt(text).crs
     }
 }
 
-impl Found {
-    /// Parses well-known text.
-    pub(crate) fn from_wkt(text: &str) -> Self {
+impl CrsDefinition {
+    /// Parses well-known text of version 1 or 2.
+    pub fn from_wkt(text: &str) -> Self {
         wkt::read(text)
     }
 }

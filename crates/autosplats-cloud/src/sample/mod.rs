@@ -18,8 +18,8 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use self::surface_samples::Place;
-pub(crate) use self::surface_samples::SurfaceSamples;
-use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, progress, random::Random};
+pub use self::surface_samples::SurfaceSamples;
+use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, random::Random};
 
 /// Points computed between two checks for cancellation.
 const BLOCK: usize = 1 << 18;
@@ -49,10 +49,11 @@ const EXTRA_HALVINGS: i32 = 6;
 /// # Examples
 ///
 /// ```
-/// use autosplats_cloud::{ReadOptions, read_mesh_bytes, sample_surface};
+/// use autosplats_cloud::{Contents, PointCloud, glam::DVec3, sample_surface};
 ///
-/// let text = b"v 0 0 2\nv 1 0 2\nv 1 1 2\nv 0 1 2\nf 1 2 3 4\n";
-/// let mesh = read_mesh_bytes("square.obj".as_ref(), text, &ReadOptions::default(), &())?;
+/// let corners = vec![[0.0, 0.0, 2.0], [1.0, 0.0, 2.0], [1.0, 1.0, 2.0], [0.0, 1.0, 2.0]];
+/// let cloud = PointCloud::new(DVec3::ZERO, corners);
+/// let mesh = Contents { cloud, triangles: vec![[0, 1, 2], [0, 2, 3]] };
 /// let cloud = sample_surface(&mesh, 1000, 1, &())?;
 /// assert_eq!(cloud.len(), 1000);
 /// assert!(cloud.positions().iter().all(|[_, _, z]| *z == 2.0));
@@ -60,14 +61,17 @@ const EXTRA_HALVINGS: i32 = 6;
 /// ```
 pub fn sample_surface(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<PointCloud, Error> {
     let sampled = SurfaceSamples::new(mesh, count, seed, progress)?.on(&mesh.cloud, progress)?;
-    progress::tick(progress, 1.0)?;
+    progress.tick(1.0)?;
     Ok(sampled)
 }
 
 impl SurfaceSamples {
-    /// Computes places for `count` points on `mesh`.
-    pub(crate) fn new(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<Self, Error> {
-        progress::tick(progress, 0.0)?;
+    /// Computes places for `count` points on `mesh`, as [`sample_surface`] does.
+    ///
+    /// # Errors
+    /// Those of [`sample_surface`].
+    pub fn new(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<Self, Error> {
+        progress.tick(0.0)?;
         let cloud = &mesh.cloud;
         let value = |field: &Field| field.values.byte_len().checked_div(cloud.len()).unwrap_or(0);
         let per_point = 12 + 3 + size_of::<Place>() + cloud.fields().iter().map(value).sum::<usize>();
@@ -77,14 +81,14 @@ impl SurfaceSamples {
         if surface.area() <= 0.0 {
             return Err(Error::NoSurface);
         }
-        progress::tick(progress, 0.1)?;
+        progress.tick(0.1)?;
 
         let mut places: Vec<Place> = Vec::new();
         let bytes = count.saturating_mul(per_point);
         let full = |_| Error::OutOfMemory { what: format!("{count} points on a surface"), bytes };
         places.try_reserve_exact(count).map_err(full)?;
         for start in (0..count).step_by(BLOCK) {
-            progress::tick(progress, 0.1 + 0.7 * start as f32 / count as f32)?;
+            progress.tick(0.1 + 0.7 * start as f32 / count as f32)?;
             let pieces = (start..count.min(start + BLOCK)).into_par_iter().step_by(PIECE);
             let made: Vec<Vec<Place>> = pieces
                 .map(|first| surface.places(first..count.min(start + BLOCK).min(first + PIECE), count, seed))
