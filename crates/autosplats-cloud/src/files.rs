@@ -1,6 +1,7 @@
 //! Files as bytes: mapped for reading, and written whole or not at all.
 
 use std::{
+    ffi::OsStr,
     fs::File,
     io::{BufWriter, Read as _, Write as _},
     ops::Deref,
@@ -94,10 +95,10 @@ pub fn write_whole<E>(
 ///
 /// # Errors
 /// Those of the operating system.
-pub fn temporary_beside(path: &Path, suffix: &str) -> std::io::Result<tempfile::NamedTempFile> {
+pub fn temporary_beside(path: &Path, suffix: impl AsRef<OsStr>) -> std::io::Result<tempfile::NamedTempFile> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".autosplats-").suffix(suffix);
+    builder.prefix(".autosplats-").suffix(suffix.as_ref());
     // Temporary files are private by default; the result shall have usual permissions.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));

@@ -10,7 +10,7 @@ use std::{
 };
 
 use autosplats_formats::ReadOptions;
-use autosplats_scenes::Scene;
+use autosplats_scenes::{SCENE_PREFIX, Scene};
 use autosplats_sources::{Animation, Next, Stream as _};
 
 /// Number of scanned frames. The best one counts, since the others include other work of the computer.
@@ -23,7 +23,7 @@ fn main() {
     let usual = [horse.to_str().unwrap(), "scene:figure", "scene:herd"].map(str::to_owned);
     println!("4 scanners of 640 x 480 rays, {} threads", std::thread::available_parallelism().unwrap());
     for name in if named.is_empty() { &usual[..] } else { &named } {
-        let animation = match name.starts_with("scene:") {
+        let animation = match name.starts_with(SCENE_PREFIX) {
             true => Scene::parse(name).and_then(|(scene, count)| Animation::scene(&scene, count, 10.0)),
             false => Animation::sequence(name, 10.0, &ReadOptions::default(), &()),
         };

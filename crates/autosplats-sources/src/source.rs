@@ -30,8 +30,6 @@ const BYTES_PER_GENERATED_POINT: u64 = 16;
 const SEQUENCE_FPS: f64 = 10.0;
 /// Default frames per second of an animated glTF or scene.
 const MOTION_FPS: f64 = 30.0;
-/// How long [`Source::read`] waits for the first points of a live stream.
-const FIRST_POINTS_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// An input of points.
 ///
@@ -101,6 +99,15 @@ pub struct PlayOptions {
 }
 
 impl Source {
+    /// Longest time to wait for the first points of a live stream. Whoever waits can cancel; a robot's connection and
+    /// its transforms may take many seconds.
+    pub const FIRST_POINTS_TIMEOUT: Duration = Duration::from_secs(30);
+
+    /// Whether a name is an address, of a generated scene or of live points, and no path.
+    pub fn is_address(name: &str) -> bool {
+        name.starts_with(SCENE_PREFIX) || name.contains("://")
+    }
+
     /// Parses the name of a source:
     ///
     /// - `scene:NAME[:COUNT][@SECONDS]` is a generated scene.
@@ -194,8 +201,9 @@ impl Source {
                 !progress.cancelled()
             }),
             moving => {
-                let cloud =
-                    moving.play(&PlayOptions::default(), options, progress)?.first(FIRST_POINTS_TIMEOUT, progress)?;
+                let cloud = moving
+                    .play(&PlayOptions::default(), options, progress)?
+                    .first(Self::FIRST_POINTS_TIMEOUT, progress)?;
                 Ok(Arc::unwrap_or_clone(cloud))
             }
         }

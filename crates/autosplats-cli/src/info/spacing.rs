@@ -53,7 +53,7 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
     let sampled: Vec<_> = (0..samples)
         .map(|i| {
             let (start, end) = (part(i), part(i + 1));
-            points[start + (Random::from_state(i as u64).bits() % (end - start) as u64) as usize]
+            points[start + Random::from_state(i as u64).modulo(end - start)]
         })
         .collect();
 
