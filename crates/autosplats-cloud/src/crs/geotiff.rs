@@ -1,18 +1,6 @@
 //! Keys of GeoTIFF headers, which LAS 1.0 to 1.3 use for coordinate systems.
 
-use super::{Crs, CrsDefinition, Unit};
-
-/// Keys of a GeoTIFF header with their parameters, as stored in its three tags.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct GeoKeys {
-    /// The key directory: version, revision, minor revision, number of keys; then four numbers per key. These are its
-    /// number, the tag of its value (0: in the directory), the count of values, and the value or the first one's index.
-    pub directory: Vec<u16>,
-    /// The floating-point values that keys refer to.
-    pub doubles: Vec<f64>,
-    /// The texts that keys refer to, each ending with `|`.
-    pub ascii: String,
-}
+use super::definition::{Crs, CrsDefinition, GeoKeys, Unit};
 
 const MODEL: u16 = 1024;
 const CITATION: u16 = 1026;

@@ -2,12 +2,26 @@
 //!
 //! The text is a tree: a keyword with values in brackets, some of which are keywords with values again.
 
-use super::{Crs, CrsDefinition, Unit};
+use super::definition::{Crs, CrsDefinition, Unit};
 
 /// Largest depth of brackets; deeper text is not parsed.
 const MAX_DEPTH: usize = 32;
 /// Largest length of parsed text, in bytes.
 const MAX_LEN: usize = 1 << 20;
+
+impl Crs {
+    /// Parses well-known text of version 1 or 2. Text that cannot be parsed is kept in `wkt`.
+    pub fn from_wkt(text: &str) -> Self {
+        CrsDefinition::from_wkt(text).crs
+    }
+}
+
+impl CrsDefinition {
+    /// Parses well-known text of version 1 or 2.
+    pub fn from_wkt(text: &str) -> Self {
+        read(text)
+    }
+}
 
 /// A keyword with its values.
 struct Node<'a> {
@@ -72,7 +86,7 @@ impl Node<'_> {
 }
 
 /// Parses a definition; `text` is kept even if it cannot be parsed.
-pub(super) fn read(text: &str) -> CrsDefinition {
+fn read(text: &str) -> CrsDefinition {
     let text = text.trim_end_matches('\0').trim();
     let mut found =
         CrsDefinition { crs: Crs { wkt: Some(text.to_owned()), ..Crs::default() }, ..CrsDefinition::default() };

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::Triangle;
+use super::triangle::Triangle;
 use crate::{Error, Field, FieldValues, PointCloud, Progress};
 
 /// Places of points on the triangles of a mesh. The points follow the vertices if these move.

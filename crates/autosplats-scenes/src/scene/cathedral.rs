@@ -11,10 +11,10 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::body::{Body, Op};
 use super::fold::Fold;
+use super::model::{Model, Points};
 use super::octree::Octree;
 use super::paint::Paint;
 use super::shape::{Placement, Shape};
-use super::{Model, Points};
 
 const STONE: Paint = Paint::Courses;
 const TRIM: Paint = Paint::Mottled { rgb: [206, 194, 172], grain: 0.3, depth: 0.05 };

@@ -9,10 +9,10 @@ use super::fold::Fold;
 use super::head::{HeadColors, head};
 use super::horse::{Coat, Gait, horse};
 use super::limb::{Hand, foot, hand, pulse, reach};
+use super::model::{Model, Points};
 use super::octree::Octree;
 use super::paint::Paint;
 use super::shape::{Placement, Shape, Similarity};
-use super::{Model, Points};
 
 const SKIN: Paint = Paint::Mottled { rgb: [216, 174, 144], grain: 0.05, depth: 0.03 };
 const CLOTH: Paint = Paint::Mottled { rgb: [150, 58, 52], grain: 0.03, depth: 0.05 };

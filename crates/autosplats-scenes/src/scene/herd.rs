@@ -5,10 +5,10 @@ use glam::{DMat3, DVec3};
 use super::body::{Body, Op};
 use super::fold::Fold;
 use super::horse::{Coat, Gait, horse};
+use super::model::{Model, Points};
 use super::octree::Octree;
 use super::paint::Paint;
 use super::shape::{Placement, Shape, Similarity, meadow_height};
-use super::{Model, Points};
 
 /// Strides per period of the animation.
 const STRIDES: f64 = 4.0;

@@ -14,6 +14,7 @@ mod head;
 mod herd;
 mod horse;
 mod limb;
+mod model;
 mod name;
 mod octree;
 mod paint;
@@ -30,9 +31,9 @@ use std::sync::{Arc, OnceLock};
 use autosplats_cloud::{Axes, Error, PointCloud};
 use glam::DVec3;
 
+use self::model::{Model, Points};
 use self::name::Kind;
-pub use self::name::{SCENE_PREFIX, parse_count};
-use self::octree::Octree;
+pub use self::name::{SCENE_PREFIX, View, parse_count};
 
 /// A generated scene: a closed surface, known exactly, at one moment of its animation. In metres, z up.
 ///
@@ -57,22 +58,6 @@ pub struct Scene {
     model: OnceLock<Arc<Model>>,
 }
 
-/// The surface, and how to take points from it.
-#[derive(Debug)]
-struct Model {
-    tree: Octree,
-    points: Points,
-}
-
-/// Origin of a scene's points.
-#[derive(Debug)]
-enum Points {
-    /// Sampled evenly on each zone. The values are the zones' shares of the points.
-    Sampled(Vec<f64>),
-    /// Scanned from these positions.
-    Scanned(Vec<DVec3>),
-}
-
 /// Intersection of a ray with the true surface of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
@@ -84,25 +69,12 @@ pub struct Hit {
     pub rgb: [f32; 3],
 }
 
-/// A view of a scene, in world coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// Position of the eye.
-    pub eye: DVec3,
-    /// Point in the middle of the image.
-    pub look_at: DVec3,
-    /// Up direction of the image.
-    pub up: DVec3,
-    /// Vertical field of view, degrees.
-    pub fov_degrees: f64,
-}
-
 impl Scene {
     /// Period of all animations, in seconds.
     pub const PERIOD: f64 = 2.0;
 
     /// Maximum number of points of a scene.
-    pub const MAX_COUNT: usize = 1_000_000_000;
+    pub const MAX_COUNT: usize = name::MAX_COUNT;
 
     /// All scenes: name and one-line description.
     pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {

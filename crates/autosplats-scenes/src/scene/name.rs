@@ -3,7 +3,21 @@
 use autosplats_cloud::Error;
 use glam::DVec3;
 
-use super::{Scene, View};
+/// Maximum number of points of a scene.
+pub(super) const MAX_COUNT: usize = 1_000_000_000;
+
+/// A view of a scene, in world coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Position of the eye.
+    pub eye: DVec3,
+    /// Point in the middle of the image.
+    pub look_at: DVec3,
+    /// Up direction of the image.
+    pub up: DVec3,
+    /// Vertical field of view, degrees.
+    pub fov_degrees: f64,
+}
 
 /// The scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,5 +132,5 @@ pub fn parse_count(text: &str) -> Option<usize> {
         return None;
     }
     let count = (number.parse::<f64>().ok()? * unit).round();
-    (count >= 1.0 && count <= Scene::MAX_COUNT as f64).then_some(count as usize)
+    (count >= 1.0 && count <= MAX_COUNT as f64).then_some(count as usize)
 }

@@ -8,11 +8,11 @@ use super::body::{Body, Op};
 use super::fold::Fold;
 use super::head::{HeadColors, head};
 use super::limb::{Hand, foot, hand, reach};
+use super::model::{Model, Points};
 use super::octree::Octree;
 use super::paint::{Paint, lattice};
 use super::pedestal::pedestal;
 use super::shape::{Placement, Shape, Similarity};
-use super::{Model, Points};
 
 const STONE: Paint = Paint::Marble;
 

@@ -5,13 +5,14 @@ use std::sync::LazyLock;
 use autosplats_cloud::{Axes, Error, PointCloud, Random};
 use glam::DVec3;
 
+use super::Scene;
 use super::body::{Body, Op};
 use super::fold::Fold;
+use super::model::Points;
 use super::octree::Octree;
 use super::paint::Paint;
 use super::sample;
 use super::shape::{Placement, Shape};
-use super::{Points, Scene};
 
 /// Larger than any scene.
 const FAR: f64 = 100.0;

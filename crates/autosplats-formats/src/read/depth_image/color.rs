@@ -8,7 +8,7 @@ use std::{
 use autosplats_cloud::guard;
 use image::{ImageFormat, ImageReader};
 
-use super::{MAX_RATIO, decode};
+use super::decode::{MAX_RATIO, decode};
 
 /// Words that replace `depth` in the name of a colour image.
 const WORDS: [&str; 4] = ["color", "rgb", "colour", "image"];

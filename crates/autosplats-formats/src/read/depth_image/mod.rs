@@ -7,15 +7,17 @@
 
 mod camera;
 pub(super) mod color;
+mod decode;
 mod pgm;
-
-use std::io::Cursor;
 
 use autosplats_cloud::{Axes, Contents, Crs, Error, PointCloud, Scan, Unit, guard};
 use glam::DMat4;
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat};
 
-use self::camera::Camera;
+use self::{
+    camera::Camera,
+    decode::{MAX_RATIO, decode},
+};
 use super::{Attribute, Description, Format, Job, table::reserve};
 
 pub(super) const FORMAT: Format = Format {
@@ -28,9 +30,6 @@ pub(super) const FORMAT: Format = Format {
 };
 
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
-
-/// Largest number of bytes that one compressed byte of a PNG can expand to.
-const MAX_RATIO: usize = 1032;
 
 /// Header of an image.
 struct Header {
@@ -175,16 +174,4 @@ fn png_values(job: &Job<'_>, width: usize, height: usize) -> Result<Vec<u16>, Er
         return Err(fault("the size of the image differs from its header"));
     }
     Ok(image.into_raw())
-}
-
-/// Decodes an image whose size has been compared with the length of its file.
-fn decode(bytes: &[u8], format: ImageFormat, width: usize, height: usize) -> Result<DynamicImage, String> {
-    let mut limits = Limits::default();
-    limits.max_image_width = u32::try_from(width).ok();
-    limits.max_image_height = u32::try_from(height).ok();
-    // At most four channels of 16 bits, and as much again for the decoder.
-    limits.max_alloc = Some((width as u64 * height as u64).saturating_mul(16).saturating_add(1 << 24));
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    reader.limits(limits);
-    reader.decode().map_err(|error| error.to_string().chars().flat_map(char::escape_debug).collect())
 }

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::{
     super::{Job, placed::fill, table::ProgressRange},
-    cloud::Source,
     element::Stored,
+    source::Source,
 };
 
 /// Colour of the points of a scan without colours, if another scan has colours.

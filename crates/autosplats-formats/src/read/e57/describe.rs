@@ -6,8 +6,7 @@ use glam::{DMat4, DVec3};
 use super::super::{Attribute, Description, Job};
 use super::{
     cloud::is_of_scanner,
-    open,
-    xml::{Root, ScanHeader},
+    xml::{Root, ScanHeader, open},
 };
 
 /// Largest number of scans described one by one.

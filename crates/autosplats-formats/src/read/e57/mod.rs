@@ -13,11 +13,16 @@ mod describe;
 mod element;
 mod packets;
 mod pages;
+mod source;
 mod xml;
 
 use autosplats_cloud::{Contents, Error};
 
-use self::{cloud::Dropped, cloud::Source, pages::Pages, xml::Root, xml::ScanHeader};
+use self::{
+    pages::Pages,
+    source::{Dropped, Source},
+    xml::{ScanHeader, open},
+};
 use super::{Format, Job, columns::MAX_COLUMNS};
 
 /// First bytes of a file.
@@ -37,14 +42,6 @@ pub(super) const FORMAT: Format = Format {
     describe: describe::describe,
     read,
 };
-
-/// Reads the header and the XML section.
-fn open<'a>(job: &Job<'a>) -> Result<(Pages<'a>, Root), Error> {
-    let pages = Pages::new(job)?;
-    let xml = pages.xml(job)?;
-    let root = Root::parse(job, &xml)?;
-    Ok((pages, root))
-}
 
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let (pages, root) = open(job)?;

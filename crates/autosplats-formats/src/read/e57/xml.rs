@@ -5,7 +5,10 @@ use glam::{DMat4, DQuat, DVec3};
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::super::Job;
-use super::element::{Element, Stored};
+use super::{
+    element::{Element, Stored},
+    pages::Pages,
+};
 
 /// Longest tag, in bytes: the parser compares all attributes of a tag with one another.
 const MAX_TAG: usize = 1 << 13;
@@ -318,4 +321,12 @@ fn time(node: Node<'_, '_>, name: &str) -> Option<f64> {
 /// A message of the parser, which may quote the file, for display.
 fn shown_long(message: &str) -> String {
     message.chars().take(200).flat_map(char::escape_debug).collect()
+}
+
+/// Reads the header and the XML section.
+pub(super) fn open<'a>(job: &Job<'a>) -> Result<(Pages<'a>, Root), Error> {
+    let pages = Pages::new(job)?;
+    let xml = pages.xml(job)?;
+    let root = Root::parse(job, &xml)?;
+    Ok((pages, root))
 }

@@ -4,63 +4,13 @@ use std::collections::HashMap;
 
 use autosplats_cloud::Error;
 use glam::DQuat;
-use serde::Deserialize;
 
 use super::super::Job;
 use super::{
-    accessor::Values,
-    buffers::Buffers,
-    buffers_of,
-    json::{Container, Mesh, Root},
-    part,
+    accessor::{Values, part},
+    buffers::{Buffers, buffers_of},
+    json::{Animation, Channel, Container, Interpolation, Mesh, NodePose, Root, Sampler},
 };
-
-#[derive(Deserialize)]
-pub(super) struct Animation<'a> {
-    #[serde(default, borrow)]
-    channels: Vec<Channel<'a>>,
-    #[serde(default)]
-    samplers: Vec<Sampler>,
-}
-
-#[derive(Deserialize)]
-struct Channel<'a> {
-    sampler: usize,
-    #[serde(borrow)]
-    target: Target<'a>,
-}
-
-#[derive(Deserialize)]
-struct Target<'a> {
-    node: Option<usize>,
-    path: std::borrow::Cow<'a, str>,
-}
-
-#[derive(Deserialize)]
-struct Sampler {
-    input: usize,
-    output: usize,
-    #[serde(default)]
-    interpolation: Interpolation,
-}
-
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "UPPERCASE")]
-enum Interpolation {
-    #[default]
-    Linear,
-    Step,
-    CubicSpline,
-}
-
-/// Values of a node that an animation replaces.
-#[derive(Default)]
-pub(super) struct NodePose {
-    pub(super) translation: Option<[f64; 3]>,
-    pub(super) rotation: Option<[f64; 4]>,
-    pub(super) scale: Option<[f64; 3]>,
-    weights: Option<Vec<f64>>,
-}
 
 /// The animated values of all nodes at one time.
 pub(super) struct Pose {

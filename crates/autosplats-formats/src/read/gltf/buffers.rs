@@ -137,3 +137,21 @@ fn percent_decoded(text: &str) -> Vec<u8> {
     }
     decoded
 }
+
+/// Indices of the buffers that hold the needed accessors.
+pub(super) fn buffers_of(root: &Root<'_>, needed: Vec<bool>) -> impl Iterator<Item = usize> {
+    let views = root.accessors.iter().zip(needed).filter(|(_, needed)| *needed).flat_map(|(accessor, _)| {
+        let sparse = accessor.sparse.as_ref().map(|sparse| [sparse.indices.buffer_view, sparse.values.buffer_view]);
+        accessor.buffer_view.into_iter().chain(sparse.into_iter().flatten())
+    });
+    // Buffers with compressed data only are skipped here; using them fails later with a message.
+    let loadable = |view: usize| {
+        let view = root.buffer_views.get(view)?;
+        let nowhere = view.is_meshopt() && root.buffers.get(view.buffer).is_some_and(|buffer| buffer.uri.is_none());
+        (!nowhere).then_some(view.buffer)
+    };
+    let mut buffers: Vec<usize> = views.filter_map(loadable).collect();
+    buffers.sort_unstable();
+    buffers.dedup();
+    buffers.into_iter()
+}

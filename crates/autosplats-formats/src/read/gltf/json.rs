@@ -8,7 +8,6 @@ use glam::{DMat4, DQuat, DVec3};
 use serde::{Deserialize, de::IgnoredAny};
 
 use super::super::Job;
-use super::animation::{Animation, NodePose};
 
 /// The whole document.
 #[derive(Deserialize)]
@@ -326,4 +325,51 @@ impl<'a> Container<'a> {
         }
         Ok(root)
     }
+}
+
+#[derive(Deserialize)]
+pub(super) struct Animation<'a> {
+    #[serde(default, borrow)]
+    pub(super) channels: Vec<Channel<'a>>,
+    #[serde(default)]
+    pub(super) samplers: Vec<Sampler>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Channel<'a> {
+    pub(super) sampler: usize,
+    #[serde(borrow)]
+    pub(super) target: Target<'a>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Target<'a> {
+    pub(super) node: Option<usize>,
+    pub(super) path: Cow<'a, str>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Sampler {
+    pub(super) input: usize,
+    pub(super) output: usize,
+    #[serde(default)]
+    pub(super) interpolation: Interpolation,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "UPPERCASE")]
+pub(super) enum Interpolation {
+    #[default]
+    Linear,
+    Step,
+    CubicSpline,
+}
+
+/// Values of a node that an animation replaces.
+#[derive(Default)]
+pub(super) struct NodePose {
+    pub(super) translation: Option<[f64; 3]>,
+    pub(super) rotation: Option<[f64; 4]>,
+    pub(super) scale: Option<[f64; 3]>,
+    pub(super) weights: Option<Vec<f64>>,
 }

@@ -17,9 +17,9 @@ use rayon::prelude::*;
 
 pub(super) use self::animation::animation;
 use self::{
-    accessor::Values,
+    accessor::{Values, part},
     animation::Pose,
-    buffers::Buffers,
+    buffers::{Buffers, buffers_of},
     json::{Attributes, Container, Root},
     plan::{FAN, PlacedPrimitive, Plan, STRIP, TRIANGLES},
 };
@@ -37,11 +37,6 @@ pub(super) const FORMAT: Format = Format {
     describe,
     read,
 };
-
-/// Progress of a step within a primitive. There are many primitives, so a step takes no share of its own.
-fn part(start: f32) -> ProgressRange {
-    ProgressRange { start, len: 0.0 }
-}
 
 fn crs() -> Crs {
     Crs { unit: Some(Unit::Metre), ..Crs::default() }
@@ -128,24 +123,6 @@ fn wanted(job: &Job<'_>, root: &Root<'_>, plan: &Plan<'_>) -> impl Iterator<Item
         }
     }
     buffers_of(root, needed)
-}
-
-/// Indices of the buffers that hold the needed accessors.
-fn buffers_of(root: &Root<'_>, needed: Vec<bool>) -> impl Iterator<Item = usize> {
-    let views = root.accessors.iter().zip(needed).filter(|(_, needed)| *needed).flat_map(|(accessor, _)| {
-        let sparse = accessor.sparse.as_ref().map(|sparse| [sparse.indices.buffer_view, sparse.values.buffer_view]);
-        accessor.buffer_view.into_iter().chain(sparse.into_iter().flatten())
-    });
-    // Buffers with compressed data only are skipped here; using them fails later with a message.
-    let loadable = |view: usize| {
-        let view = root.buffer_views.get(view)?;
-        let nowhere = view.is_meshopt() && root.buffers.get(view.buffer).is_some_and(|buffer| buffer.uri.is_none());
-        (!nowhere).then_some(view.buffer)
-    };
-    let mut buffers: Vec<usize> = views.filter_map(loadable).collect();
-    buffers.sort_unstable();
-    buffers.dedup();
-    buffers.into_iter()
 }
 
 /// Context of reading a primitive.

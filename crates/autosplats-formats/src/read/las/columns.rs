@@ -19,11 +19,15 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
+    super::Job,
     dimension::{Dimension, Source, zeroed},
     extra::Extra,
-    header::Header,
+    header::{Header, bytes_at},
 };
 use crate::las::{self, ANGLE_STEP, Place};
+
+/// Points decoded between two checks for cancellation, and points of a preview chunk.
+pub(super) const BATCH: usize = 1 << 19;
 
 /// Records that stay in the innermost cache while their values are taken one field after the other.
 const CACHED: usize = 1 << 9;
@@ -423,13 +427,11 @@ fn clear(colors: &mut [[u8; 3]]) {
 }
 
 #[inline]
-pub(super) fn bytes_at<const LEN: usize>(record: &[u8], at: usize) -> [u8; LEN] {
-    let mut bytes = [0; LEN];
-    bytes.copy_from_slice(&record[at..at + LEN]);
-    bytes
-}
-
-#[inline]
 fn u16_at(record: &[u8], at: usize) -> u16 {
     u16::from_le_bytes(bytes_at(record, at))
+}
+
+/// Passes newly filled points to the caller as a preview chunk.
+pub(super) fn preview(job: &Job<'_>, columns: &Columns<'_>, start: usize, count: usize) -> Result<(), Error> {
+    job.preview(|| columns.preview(start..start + count))
 }

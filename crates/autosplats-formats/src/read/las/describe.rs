@@ -3,7 +3,13 @@
 use autosplats_cloud::Error;
 
 use super::super::{Attribute, Description, Job};
-use super::{columns::bytes_at, coordinates, dimension::Source, dimensions, header::Header, laz, records::Records};
+use super::{
+    coordinates,
+    dimension::{Source, dimensions},
+    header::{Header, bytes_at},
+    laz,
+    records::Records,
+};
 use crate::las;
 
 /// Bytes of the COPC info record.

@@ -3,8 +3,13 @@
 use autosplats_cloud::{Error, FieldValues};
 use bytemuck::{Zeroable, allocation::try_zeroed_vec};
 
-use super::{super::table::Scalar, extra::Extra};
-use crate::las::Place;
+use super::{
+    super::table::Scalar,
+    extra::{Extra, extras},
+    header::Header,
+    records::Records,
+};
+use crate::las::{self, Place};
 
 /// Source of a field in a record.
 #[derive(Clone, Debug)]
@@ -76,4 +81,21 @@ impl Dimension {
 pub(super) fn zeroed<T: Zeroable>(count: usize, what: &str) -> Result<Vec<T>, Error> {
     try_zeroed_vec(count)
         .map_err(|()| Error::OutOfMemory { what: what.into(), bytes: count.saturating_mul(size_of::<T>()) })
+}
+
+/// All values of a point except coordinates and colours, and notes about them.
+pub(super) fn dimensions(header: &Header, records: &Records<'_>) -> (Vec<Dimension>, Vec<String>) {
+    let own = las::places(header.format).into_iter();
+    let own = own.map(|(name, place)| Dimension { name: name.into(), source: Source::Own(place) });
+    let mut dimensions: Vec<Dimension> = own.collect();
+    let (found, mut notes) = extras(header, records);
+    let found = found.into_iter().map(|extra| Dimension { name: extra.name.clone(), source: Source::Extra(extra) });
+    dimensions.extend(found);
+    if las::has_waveforms(header.format) {
+        notes.push("waveforms are not read".into());
+    }
+    if header.version.0 != 1 || header.version.1 > 4 {
+        notes.push(format!("{} is an unknown version; read as well as possible", header.version_name()));
+    }
+    (dimensions, notes)
 }

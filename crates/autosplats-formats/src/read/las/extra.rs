@@ -2,8 +2,7 @@
 
 use super::super::{columns::MAX_COLUMNS, table::Scalar};
 use super::{
-    columns::bytes_at,
-    header::{Header, text},
+    header::{Header, bytes_at, text},
     records::Records,
 };
 use crate::las;

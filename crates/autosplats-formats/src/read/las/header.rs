@@ -153,3 +153,10 @@ pub(super) fn text(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..end]);
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>().trim().to_owned()
 }
+
+#[inline]
+pub(super) fn bytes_at<const LEN: usize>(record: &[u8], at: usize) -> [u8; LEN] {
+    let mut bytes = [0; LEN];
+    bytes.copy_from_slice(&record[at..at + LEN]);
+    bytes
+}

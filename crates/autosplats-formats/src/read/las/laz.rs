@@ -17,12 +17,10 @@ use laz::{
 
 use super::super::Job;
 use super::{
-    BATCH,
-    columns::Columns,
+    columns::{BATCH, Columns, preview},
     gps_time::GpsTime11,
     header::Header,
     point14::{self, Point14},
-    preview,
     records::Records,
 };
 

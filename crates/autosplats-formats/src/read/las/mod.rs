@@ -24,17 +24,14 @@ use autosplats_cloud::{Contents, Error, sampled_middle};
 use glam::DVec3;
 
 use self::{
-    columns::Columns,
-    dimension::{Dimension, Source},
+    columns::{BATCH, Columns, preview},
+    dimension::{Dimension, dimensions},
     header::Header,
     laz::Compressed,
     records::Records,
 };
 use super::{Format, Job};
 use crate::las;
-
-/// Points decoded between two checks for cancellation, and points of a preview chunk.
-const BATCH: usize = 1 << 19;
 
 /// Uncompressed points that one thread decodes at a time.
 const RUN: usize = 1 << 13;
@@ -104,23 +101,6 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     Ok(cloud.with_crs(meaning.crs).with_resolution(header.scale.abs()).into())
 }
 
-/// All values of a point except coordinates and colours, and notes about them.
-fn dimensions(header: &Header, records: &Records<'_>) -> (Vec<Dimension>, Vec<String>) {
-    let own = las::places(header.format).into_iter();
-    let own = own.map(|(name, place)| Dimension { name: name.into(), source: Source::Own(place) });
-    let mut dimensions: Vec<Dimension> = own.collect();
-    let (extras, mut notes) = extra::extras(header, records);
-    let extras = extras.into_iter().map(|extra| Dimension { name: extra.name.clone(), source: Source::Extra(extra) });
-    dimensions.extend(extras);
-    if las::has_waveforms(header.format) {
-        notes.push("waveforms are not read".into());
-    }
-    if header.version.0 != 1 || header.version.1 > 4 {
-        notes.push(format!("{} is an unknown version; read as well as possible", header.version_name()));
-    }
-    (dimensions, notes)
-}
-
 /// The number of complete records, and the number of missing ones.
 fn complete(job: &Job<'_>, header: &Header) -> Result<(usize, u64), Error> {
     let held = (job.bytes.len() - header.point_data) / header.record_len;
@@ -163,9 +143,4 @@ fn uncompressed(job: &Job<'_>, header: &Header, columns: &mut Columns<'_>, point
         preview(job, columns, start, batch.len() / len)?;
     }
     Ok(())
-}
-
-/// Passes newly filled points to the caller as a preview chunk.
-fn preview(job: &Job<'_>, columns: &Columns<'_>, start: usize, count: usize) -> Result<(), Error> {
-    job.preview(|| columns.preview(start..start + count))
 }

@@ -12,7 +12,7 @@ use super::super::{
 };
 use super::{
     header::{Element, Encoding, Header},
-    integer, list_len, skip, skip_rows,
+    walk::{integer, list_len, skip, skip_rows},
 };
 
 /// Progress of reading faces, which is not shown: points come first.

@@ -8,7 +8,7 @@ use super::{
         body::{Body, Records},
     },
     header::{Element, Encoding, Header, Property},
-    list_len,
+    walk::list_len,
 };
 
 /// Binary elements, some of which have lists.
