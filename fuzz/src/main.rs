@@ -14,10 +14,10 @@
 mod meter;
 mod mutate;
 #[allow(clippy::unwrap_used, reason = "it was written for tests")]
-#[path = "../../crates/autosplats-cloud/tests/it/common/recording.rs"]
+#[path = "../../crates/autosplats-sources/tests/it/common/recording.rs"]
 mod recording;
 #[allow(dead_code, reason = "tests use the rest")]
-#[path = "../../crates/autosplats-cloud/tests/it/common/ros.rs"]
+#[path = "../../crates/autosplats-sources/tests/it/common/ros.rs"]
 mod ros;
 mod seeds;
 mod target;
@@ -34,10 +34,11 @@ use std::{
 };
 
 use anyhow::{Context as _, Result, bail, ensure};
-use autosplats_cloud::{Error, PointCloud, Progress, ReadOptions};
+use autosplats_cloud::{Error, PointCloud, Progress, Random};
+use autosplats_formats::ReadOptions;
 use clap::Parser;
 
-use crate::mutate::{Random, mutate, repair_pages};
+use crate::mutate::{mutate, repair_pages};
 use crate::seeds::{Seeds, add_corpus, all};
 
 /// Time limit for an input: far more than a sound reader needs, far less than it takes to follow a false count.
@@ -258,22 +259,22 @@ impl<'a> Run<'a> {
     }
 
     fn one(&mut self, name: &Path, number: u64) -> Result<()> {
-        let mut random = Random(self.seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ number << 20);
+        let mut random = Random::from_state(self.seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ number << 20);
         // Half of the inputs start from a seed, because readers reject a broken file early.
-        let from = if random.below(2) == 0 { &self.seeds.files } else { &self.pool };
-        let mut bytes = from[random.below(from.len())].clone();
+        let from = if random.modulo(2) == 0 { &self.seeds.files } else { &self.pool };
+        let mut bytes = from[random.modulo(from.len())].clone();
         mutate(&mut bytes, &self.seeds.files, &mut random);
-        if self.seeds.extension == "e57" && random.below(8) > 0 {
+        if self.seeds.extension == "e57" && random.modulo(8) > 0 {
             repair_pages(&mut bytes);
         }
         let options = ReadOptions {
-            exact: random.below(4) == 0,
-            keep_no_returns: random.below(8) == 0,
-            columns: (random.below(16) == 0).then(|| ["x", "y", "z", "-"].map(String::from).into()),
+            exact: random.modulo(4) == 0,
+            keep_no_returns: random.modulo(8) == 0,
+            columns: (random.modulo(16) == 0).then(|| ["x", "y", "z", "-"].map(String::from).into()),
             ..ReadOptions::default()
         };
-        let mesh = random.below(4) == 0;
-        let watcher = Watcher { chunks: random.below(8) == 0, notes: Mutex::default() };
+        let mesh = random.modulo(4) == 0;
+        let watcher = Watcher { chunks: random.modulo(8) == 0, notes: Mutex::default() };
 
         self.leave(name, &bytes)?;
         let before = Instant::now();

@@ -1,24 +1,14 @@
 //! Mutations of files, the same on every computer.
 
-/// Pseudo-random numbers by splitmix64.
-pub(crate) struct Random(pub(crate) u64);
+use autosplats_cloud::Random;
 
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
+/// A number below `end`; 0 if there is none.
+fn below(random: &mut Random, end: usize) -> usize {
+    if end == 0 { 0 } else { random.modulo(end) }
+}
 
-    pub(crate) fn below(&mut self, end: usize) -> usize {
-        if end == 0 { 0 } else { (self.next() % end as u64) as usize }
-    }
-
-    fn pick<T: Copy>(&mut self, of: &[T]) -> T {
-        of[self.below(of.len())]
-    }
+fn pick<T: Copy>(random: &mut Random, of: &[T]) -> T {
+    of[random.modulo(of.len())]
 }
 
 /// Values at the limits of the integers that readers compute with.
@@ -76,29 +66,29 @@ const WORDS: [&str; 28] = [
 /// Applies one to eight mutations to a file. Pieces come from `others`, files of the same format.
 pub(crate) fn mutate(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
     // Most faults lie near the start of a file, where the headers are, so half of the places are there.
-    let ways = if random.below(4) > 0 { 1 } else { 2 + random.below(7) };
+    let ways = if random.modulo(4) > 0 { 1 } else { 2 + random.modulo(7) };
     for _ in 0..ways {
-        let near = if random.below(2) == 0 { bytes.len().min(512) } else { bytes.len() };
-        let at = random.below(near);
-        match random.below(11) {
+        let near = if random.modulo(2) == 0 { bytes.len().min(512) } else { bytes.len() };
+        let at = below(random, near);
+        match random.modulo(11) {
             0 => bit(bytes, at, random),
             1 => edge(bytes, at, random),
             2 => bytes.truncate(at),
             3 => {
-                let end = (at + 1 + random.below(64)).min(bytes.len());
+                let end = (at + 1 + random.modulo(64)).min(bytes.len());
                 bytes.drain(at..end);
             }
             4 => {
-                let end = (at + 1 + random.below(64)).min(bytes.len());
+                let end = (at + 1 + random.modulo(64)).min(bytes.len());
                 let piece = bytes[at..end].to_vec();
                 insert(bytes, at, &piece);
             }
             5 => {
-                let other = &others[random.below(others.len())];
-                let from = random.below(other.len());
-                let len = random.below(256);
+                let other = &others[below(random, others.len())];
+                let from = below(random, other.len());
+                let len = random.modulo(256);
                 let piece = &other[from..(from + len).min(other.len())];
-                if random.below(2) == 0 {
+                if random.modulo(2) == 0 {
                     insert(bytes, at, piece);
                 } else {
                     let end = (at + piece.len()).min(bytes.len());
@@ -109,10 +99,10 @@ pub(crate) fn mutate(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Rando
             8 => line(bytes, at, random),
             9 => small_step(bytes, at, random),
             _ => {
-                for _ in 0..random.below(8) {
-                    let at = random.below(bytes.len());
+                for _ in 0..random.modulo(8) {
+                    let at = below(random, bytes.len());
                     if let Some(byte) = bytes.get_mut(at) {
-                        *byte = random.next() as u8;
+                        *byte = random.bits() as u8;
                     }
                 }
             }
@@ -122,18 +112,18 @@ pub(crate) fn mutate(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Rando
 
 fn bit(bytes: &mut [u8], at: usize, random: &mut Random) {
     if let Some(byte) = bytes.get_mut(at) {
-        *byte ^= 1 << random.below(8);
+        *byte ^= 1 << random.modulo(8);
     }
 }
 
 /// Writes one of `EDGES` with 1, 2, 4 or 8 bytes, in either byte order.
 fn edge(bytes: &mut [u8], at: usize, random: &mut Random) {
-    let size = random.pick(&[1, 2, 4, 8]);
-    let value = random.pick(&EDGES);
-    let raw = if random.below(4) == 0 { value.to_be_bytes() } else { value.to_le_bytes() };
-    let raw = if random.below(4) == 0 { &raw[8 - size..] } else { &raw[..size] };
+    let size = pick(random, &[1, 2, 4, 8]);
+    let value = pick(random, &EDGES);
+    let raw = if random.modulo(4) == 0 { value.to_be_bytes() } else { value.to_le_bytes() };
+    let raw = if random.modulo(4) == 0 { &raw[8 - size..] } else { &raw[..size] };
     // Most numbers of binary headers are aligned.
-    let at = if random.below(2) == 0 { at / size * size } else { at };
+    let at = if random.modulo(2) == 0 { at / size * size } else { at };
     for (byte, new) in bytes.iter_mut().skip(at).zip(raw) {
         *byte = *new;
     }
@@ -142,7 +132,7 @@ fn edge(bytes: &mut [u8], at: usize, random: &mut Random) {
 /// Adds or subtracts 1, or adds 2 or 16, to break counts and sizes by a little.
 fn small_step(bytes: &mut [u8], at: usize, random: &mut Random) {
     if let Some(byte) = bytes.get_mut(at) {
-        *byte = byte.wrapping_add(random.pick(&[1, 0xff, 2, 16]));
+        *byte = byte.wrapping_add(pick(random, &[1, 0xff, 2, 16]));
     }
 }
 
@@ -158,7 +148,7 @@ fn word(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     let separates = |byte: &u8| byte.is_ascii_whitespace() || matches!(byte, b',' | b'"' | b'<' | b'>' | b'=' | b':');
     let start = bytes[..at].iter().rposition(separates).map_or(0, |found| found + 1);
     let len = bytes[at..].iter().take(64).position(separates).unwrap_or(0);
-    let word = random.pick(&WORDS);
+    let word = pick(random, &WORDS);
     bytes.splice(start.max(at.saturating_sub(64))..at + len, word.bytes());
 }
 
@@ -167,12 +157,12 @@ fn line(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     let start = bytes[..at].iter().rposition(|&byte| byte == b'\n').map_or(0, |found| found + 1);
     let end = bytes[at..].iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |found| at + found + 1);
     let line: Vec<u8> = bytes[start..end].iter().take(1 << 12).copied().collect();
-    match random.below(3) {
+    match random.modulo(3) {
         0 => drop(bytes.drain(start..end)),
         1 => insert(bytes, start, &line),
         _ => {
             bytes.drain(start..end);
-            let at = random.below(bytes.len());
+            let at = below(random, bytes.len());
             insert(bytes, at, &line);
         }
     }
@@ -211,7 +201,7 @@ mod tests {
         let others = [b"ply\nformat ascii 1.0\n".to_vec()];
         let change = |seed| {
             let mut bytes = others[0].clone();
-            mutate(&mut bytes, &others, &mut Random(seed));
+            mutate(&mut bytes, &others, &mut Random::from_state(seed));
             bytes
         };
         assert_eq!(change(7), change(7), "one seed, one file");

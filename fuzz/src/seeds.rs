@@ -4,7 +4,9 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result};
 use autosplats_cloud::glam::{DMat4, DQuat, DVec3};
-use autosplats_cloud::{FieldValues, PointCloud, Scan, point_cloud2::Encoding, write};
+use autosplats_cloud::{FieldValues, PointCloud, Scan};
+use autosplats_formats::write;
+use autosplats_sources::point_cloud2::Encoding;
 
 use crate::{
     recording::{Message, POINTS as CLOUDS, Style, TRANSFORMS, Topic, bag, mcap},

@@ -2,10 +2,11 @@
 
 use std::{path::Path, time::Duration};
 
-use autosplats_cloud::{
-    Error, Next, Progress, ReadOptions, Recording, RecordingOptions, Stream as _, describe_bytes,
+use autosplats_cloud::{Error, Progress};
+use autosplats_formats::{ReadOptions, describe_bytes, read_bytes, read_mesh_bytes};
+use autosplats_sources::{
+    Next, Recording, RecordingOptions, Stream as _,
     point_cloud2::{self, Encoding},
-    read_bytes, read_mesh_bytes,
 };
 
 /// The encoding of a bare message. `None` for all other files.

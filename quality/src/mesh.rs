@@ -5,7 +5,8 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use autosplats::cloud::glam::DVec3;
-use autosplats::cloud::{Contents, PointCloud, ReadOptions, read_mesh};
+use autosplats::cloud::{Contents, PointCloud};
+use autosplats_formats::{ReadOptions, read_mesh};
 use bvh::aabb::{Aabb, Bounded};
 use bvh::bounding_hierarchy::{BHShape, BoundingHierarchy as _};
 use bvh::bvh::Bvh;

@@ -12,11 +12,12 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use autosplats::cloud::glam::{DQuat, DVec3};
-use autosplats::cloud::{Axes, PointCloud, Scene, sample_surface};
+use autosplats::cloud::{Axes, PointCloud, sample_surface};
+use autosplats_scenes::Scene;
 
 use crate::mesh::{Hit, Mesh};
 use crate::neighbors::Neighbors;
-use crate::random::Random;
+use crate::random::{normal3, random};
 use crate::rays::Rays;
 use crate::surface::Surface;
 use crate::sweep::Sweep;
@@ -210,16 +211,16 @@ impl Subject {
         let place = |(i, &point): (usize, &DVec3)| {
             let is_second = recipe.misregistration > 0.0 && i % 2 == 1;
             let point = if is_second { middle + turn * (point - middle) + shift } else { point };
-            let noise = if recipe.noise > 0.0 { Random::new(1, i).gauss3() } else { DVec3::ZERO };
+            let noise = if recipe.noise > 0.0 { normal3(&mut random(1, i)) } else { DVec3::ZERO };
             let along = recipe.sweep.filter(|sweep| sweep.noise > 0.0).map_or(DVec3::ZERO, |sweep| {
-                (point - sweep.origin()).normalize() * (sweep.noise * Random::new(4, i).gauss())
+                (point - sweep.origin()).normalize() * (sweep.noise * random(4, i).normal())
             });
             (point + along + noise * (recipe.noise * diagonal)).as_vec3().to_array()
         };
         let mut positions: Vec<_> = clean.iter().enumerate().map(place).collect();
         let outliers = (recipe.outliers * clean.len() as f64) as usize;
         positions.extend((0..outliers).map(|i| {
-            let mut random = Random::new(2, i);
+            let mut random = random(2, i);
             (low + (high - low) * DVec3::from([(); 3].map(|()| random.unit()))).as_vec3().to_array()
         }));
         let with_axes = |cloud: PointCloud| if let Some(axes) = axes { cloud.with_axes(axes) } else { cloud };
@@ -308,7 +309,7 @@ fn sample_points(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
         let share = few.positions().iter().map(keep).sum::<f64>() / few.len() as f64;
         let many = sample((recipe.count as f64 / share) as usize, 1)?;
         let lots = many.positions().iter().enumerate();
-        let left = lots.filter(|&(i, p)| Random::new(3, i).unit() < keep(p)).map(|(_, &p)| p);
+        let left = lots.filter(|&(i, p)| random(3, i).unit() < keep(p)).map(|(_, &p)| p);
         PointCloud::new(many.origin(), left.collect())
     };
     Ok((Surface::Mesh(Arc::new(mesh)), cloud.with_axes(axes)))

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use autosplats::cloud::Scene;
 use autosplats::cloud::glam::DVec3;
+use autosplats_scenes::Scene;
 
 use crate::mesh::{Hit, Mesh};
 

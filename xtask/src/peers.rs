@@ -10,7 +10,7 @@ use crate::machine::install;
 use crate::{FEATURES, cargo_command};
 
 /// The packages and their versions.
-const PACKAGES: &str = "crates/autosplats-cloud/tests/interop/requirements.txt";
+const PACKAGES: &str = "crates/autosplats-sources/tests/interop/requirements.txt";
 /// Where they are installed, below `target`; kept as long as the list is the same.
 const FOLDER: &str = "interop-python";
 /// What an environment of Python takes on Debian and its kin.

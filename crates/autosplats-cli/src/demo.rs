@@ -4,7 +4,7 @@ use std::fs::create_dir_all;
 use std::time::Instant;
 
 use autosplats::{Renderer, Settings, still_supersample};
-use autosplats_cloud::Scene;
+use autosplats_scenes::Scene;
 
 use crate::args::DemoArgs;
 use crate::exit::{Exit, Failure};

@@ -5,7 +5,9 @@ use std::io::{IsTerminal as _, stderr, stdout};
 use std::time::Instant;
 
 use autosplats::{AdapterSummary, Backend as BackendChoice, Frame, Renderer, Settings, adapters};
-use autosplats_cloud::{Scene, available_memory, formats, read, write, written_formats};
+use autosplats_cloud::available_memory;
+use autosplats_formats::{formats, read, write, written_formats};
+use autosplats_scenes::Scene;
 use pulp::{Arch, Simd, WithSimd};
 use serde::Serialize;
 

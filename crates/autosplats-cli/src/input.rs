@@ -8,10 +8,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use autosplats_cloud::glam::{DMat4, DVec3};
-use autosplats_cloud::{
-    Error, LatestOptions, Live, PlayOptions, Player, PointCloud, Progress, ReadOptions, Scene, Source, beginnings,
-    check_memory, read_mesh, sample_surface,
-};
+use autosplats_cloud::{Error, PointCloud, Progress, check_memory, sample_surface};
+use autosplats_formats::{ReadOptions, read_mesh};
+use autosplats_scenes::{SCENE_PREFIX, Scene};
+use autosplats_sources::{LatestOptions, Live, PlayOptions, Player, Source, beginnings};
 use rayon::prelude::*;
 
 use self::pose::read_pose;
@@ -19,12 +19,6 @@ use crate::args::{InputArgs, PlayingArgs, ReadingArgs};
 use crate::exit::{Exit, Failure, suggest};
 use crate::output::{ReadFiles, folder_of};
 use crate::progress::{Bar, InputProgress};
-
-/// Prefix of a generated scene's name.
-const SCENE_PREFIX: &str = "scene:";
-
-/// Longest time to wait for the first points of a live input.
-pub(crate) const FIRST_POINTS_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Most fields and inputs that a message names.
 const MAX_LISTED_NAMES: usize = 10;
@@ -199,7 +193,7 @@ impl Inputs {
             if frames > 1 {
                 progress.note(&format!("this is the first of {frames} frames"));
             }
-            player.first(FIRST_POINTS_TIMEOUT, progress).map(Arc::unwrap_or_clone)
+            player.first(Source::FIRST_POINTS_TIMEOUT, progress).map(Arc::unwrap_or_clone)
         })
     }
 

@@ -28,6 +28,7 @@ mod view;
 use std::path::Path;
 use std::process::ExitCode;
 
+use autosplats_sources::Source;
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser as _};
 
@@ -88,8 +89,7 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
 /// Views inputs that have no command. A word that is neither an input nor a command is an error with a suggestion.
 fn without_command(typed: Vec<String>) -> Result<(), Failure> {
     let first = typed.first().map_or("", String::as_str);
-    let is_address = first.starts_with("scene:") || first.contains("://");
-    if first.starts_with('-') || is_address || first.contains('.') || Path::new(first).exists() {
+    if first.starts_with('-') || Source::is_address(first) || first.contains('.') || Path::new(first).exists() {
         let words = ["autosplats".into(), "view".into()].into_iter().chain(typed);
         return CommandLine::try_parse_from(words).map_err(|error| Failure::usage(one_line(&error))).and_then(run);
     }

@@ -6,7 +6,7 @@ use crate::exit::Failure;
 /// Lists the topics at an address, those with points first.
 #[cfg(feature = "zenoh")]
 pub(crate) fn run(args: &TopicsArgs) -> Result<(), Failure> {
-    use autosplats_cloud::remote::topics;
+    use autosplats_sources::remote::topics;
 
     use crate::exit::Exit;
     use crate::output::print_line;

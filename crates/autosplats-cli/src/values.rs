@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use autosplats::{Background, ColorMode, MAX_SIDE, Reconstruction};
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{DepthCamera, parse_count};
+use autosplats_formats::DepthCamera;
+use autosplats_scenes::parse_count;
 use serde::{Serialize, Serializer};
 
 /// Names of the colour modes. Any other name is a field's.

@@ -1,16 +1,16 @@
 //! The point cloud, which every reader makes and every renderer takes.
 
-use std::{ops::Range, path::Path};
+use std::ops::Range;
 
 use glam::{DMat4, DVec3};
 
-use crate::{Crs, Error, Progress, identity::Identity};
+use crate::{Crs, Error, identity::Identity};
 
 /// Points of one frame: positions and the attributes that the scanner recorded.
 ///
 /// A position is stored as three `f32` relative to an `f64` [`origin`](Self::origin). Survey coordinates reach 5e6,
 /// where one `f32` step is half a metre. World coordinates are `origin + position`, plus a [residual](Self::residuals)
-/// if the file was read [exactly](crate::ReadOptions::exact). Every attribute has one entry per point.
+/// if all digits of a file are kept. Every attribute has one entry per point.
 ///
 /// # Examples
 ///
@@ -111,7 +111,8 @@ pub enum FieldValues {
     F64(Vec<f64>),
 }
 
-/// Evaluates `$body` with `$v` bound to the typed vector inside `$values`.
+/// Evaluates `$body` with `$v` bound to the typed vector inside `$values`, which are [`FieldValues`].
+#[macro_export]
 macro_rules! each_type {
     ($values:expr, $v:ident => $body:expr) => {
         match $values {
@@ -128,7 +129,6 @@ macro_rules! each_type {
         }
     };
 }
-pub(crate) use each_type;
 
 impl FieldValues {
     /// Number of values.
@@ -164,14 +164,6 @@ impl PointCloud {
     /// Non-finite positions are allowed, because scanners record them. The renderer drops and counts them.
     pub fn new(origin: DVec3, positions: Vec<[f32; 3]>) -> Self {
         Self { origin, positions, ..Self::default() }
-    }
-
-    /// Reads a file in any known format; see [`read`](crate::read).
-    ///
-    /// # Errors
-    /// Those of [`read`](crate::read).
-    pub fn from_path(path: impl AsRef<Path>, progress: &dyn Progress) -> Result<Self, Error> {
-        crate::read(path.as_ref(), progress)
     }
 
     /// Sets the colours: sRGB, 8 bits per channel.
@@ -256,7 +248,7 @@ impl PointCloud {
     }
 
     /// Whether the finite points span less than 1 m along each axis, assuming metres: nobody could stand among them.
-    pub(crate) fn is_small(&self) -> bool {
+    pub fn is_small(&self) -> bool {
         const SMALL: f32 = 1.0;
         let none = [f32::INFINITY, f32::NEG_INFINITY];
         (0..3).all(|axis| {

@@ -1,18 +1,19 @@
 //! Errors of reading, writing and generating clouds.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Errors of reading, writing or generating a cloud. Each message is one line.
+/// Errors of reading, writing, playing or generating a cloud. Each message is one line.
+///
+/// All crates of points share this type, since most errors pass through several of them.
 ///
 /// # Examples
 ///
 /// ```
-/// use autosplats_cloud::{Error, ReadOptions, read_bytes};
+/// use autosplats_cloud::Error;
 ///
-/// let result = read_bytes("letter.doc".as_ref(), b"Dear Sir", &ReadOptions::default(), &());
-/// let Err(error) = result else { panic!("a letter has no points") };
-/// assert!(matches!(error, Error::UnknownFormat { .. }));
-/// assert!(error.to_string().starts_with("letter.doc: unknown format"));
+/// let error = Error::malformed("scan.ply".as_ref(), "line 3", "'abc' is not a number");
+/// assert!(matches!(error, Error::Malformed { .. }));
+/// assert_eq!(error.to_string(), "scan.ply: line 3: 'abc' is not a number");
 /// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -36,16 +37,20 @@ pub enum Error {
         source: std::io::Error,
     },
     /// Neither the content nor the name of a file identifies a format that can be read.
-    #[error("{}: unknown format; {} can be read", path.display(), crate::read::format_names())]
+    #[error("{}: unknown format; {} can be read", path.display(), known)]
     UnknownFormat {
         /// The file.
         path: PathBuf,
+        /// Names of the formats that can be read.
+        known: String,
     },
     /// The extension of an output file names no format that can be written.
-    #[error("{}: unknown output format; {} can be written", path.display(), crate::write::format_names())]
+    #[error("{}: unknown output format; {} can be written", path.display(), known)]
     UnknownOutput {
         /// The file.
         path: PathBuf,
+        /// Names and extensions of the formats that can be written.
+        known: String,
     },
     /// A file breaks the rules of its format.
     #[error("{}: {place}: {what}", path.display())]
@@ -123,13 +128,31 @@ pub enum Error {
     Cancelled,
 }
 
+impl Error {
+    /// [`Error::Malformed`], with `what` as [one line](one_line).
+    pub fn malformed(path: &Path, place: impl Into<String>, what: impl AsRef<str>) -> Self {
+        Self::Malformed { path: path.into(), place: place.into(), what: one_line(what.as_ref()) }
+    }
+
+    /// [`Error::Unsupported`], with `what` as [one line](one_line).
+    pub fn unsupported(path: &Path, what: impl AsRef<str>) -> Self {
+        Self::Unsupported { path: path.into(), what: one_line(what.as_ref()) }
+    }
+}
+
 /// Longest error message, in characters; messages may quote parts of a file.
 const MAX_MESSAGE: usize = 600;
 
-/// Cuts a message to a few lines and replaces control characters, which could act on a terminal.
-pub(crate) fn message(text: &str) -> String {
+/// A message cut to a few hundred characters, without control characters, which could act on a terminal.
+pub fn one_line(text: &str) -> String {
     if text.len() <= MAX_MESSAGE && !text.contains(char::is_control) {
         return text.to_owned();
     }
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).take(MAX_MESSAGE).collect()
+}
+
+/// A piece of a file for a message: at most 40 bytes, without characters that act on a terminal.
+pub fn excerpt(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(40)]);
+    text.chars().flat_map(char::escape_debug).collect()
 }

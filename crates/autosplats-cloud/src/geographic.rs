@@ -3,7 +3,11 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{Crs, PointCloud, Unit, identity::Identity, merge::residual, read::middle};
+use crate::{
+    Crs, PointCloud, Unit,
+    identity::Identity,
+    precision::{residual, sampled_middle},
+};
 
 /// Semi-major axis of the WGS 84 ellipsoid, in metres.
 const SEMI_MAJOR: f64 = 6_378_137.0;
@@ -31,7 +35,7 @@ impl PointCloud {
             return None;
         }
         let middle = beside.map_or_else(
-            || middle(self.len(), |i| self.world_position(i) * STEPS_PER_DEGREE) / STEPS_PER_DEGREE,
+            || sampled_middle(self.len(), |i| self.world_position(i) * STEPS_PER_DEGREE) / STEPS_PER_DEGREE,
             |LocalMetres { middle, .. }| *middle,
         );
         Some(LocalMetres::at(middle, self.crs.vertical_unit.and_then(Unit::metres).unwrap_or(1.0)))
@@ -63,7 +67,7 @@ impl PointCloud {
     }
 
     /// Metres per unit of x, y and z, if they are lengths.
-    pub(crate) fn metres_per_unit(&self) -> Option<DVec3> {
+    pub fn metres_per_unit(&self) -> Option<DVec3> {
         let Crs { unit, vertical_unit, .. } = &self.crs;
         let across = (*unit)?.metres()?;
         Some(DVec3::new(across, across, vertical_unit.map_or(Some(across), Unit::metres)?))
@@ -71,7 +75,7 @@ impl PointCloud {
 
     /// Multiplies world coordinates by `scale`, in metres per unit. The coordinate system is dropped, because it has
     /// another unit. Sensors are moved but not rotated.
-    pub(crate) fn scale_to_metres(&mut self, scale: DVec3) {
+    pub fn scale_to_metres(&mut self, scale: DVec3) {
         let world = |i: usize| self.world_position(i) * scale;
         let origin = (self.origin * scale).round();
         let positions = (0..self.len()).into_par_iter().map(|i| (world(i) - origin).as_vec3().to_array()).collect();

@@ -1,65 +1,48 @@
-//! Point clouds: the files they are read from and written to, and the sources that make them.
+//! Point clouds, and what works on them: joining, moving, thinning, sampling on surfaces, coordinate systems.
 //!
-//! This crate turns bytes into a [`PointCloud`]. It draws nothing and uses no GPU.
+//! This crate reads no format, draws nothing and uses no GPU. The crates of files, scenes and sources stand on it; what
+//! they share is here too: errors, progress, memory, random numbers and whole files.
 //!
 //! ```
-//! use autosplats_cloud::{PointCloud, write};
+//! use autosplats_cloud::{PointCloud, glam::{DMat4, DVec3}};
 //!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let folder = tempfile::tempdir()?;
-//! # let path = |name| folder.path().join(name);
-//! std::fs::write(path("survey.csv"), "x,y,z,Intensity\n512000.5,5400000.25,310.0,7\n")?;
-//! let cloud = PointCloud::from_path(path("survey.csv"), &())?;
-//! assert_eq!(cloud.world_position(0).y, 5_400_000.25);
-//! write(&cloud, &path("survey.ply"), &())?;
-//! # Ok(())
-//! # }
+//! let wall = PointCloud::new(DVec3::ZERO, vec![[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]);
+//! let pose = DMat4::from_translation(DVec3::new(512_000.0, 5_400_000.0, 310.0));
+//! let mut survey = PointCloud::merge(vec![(wall, pose)]);
+//! survey.crop(DVec3::splat(0.0), DVec3::splat(1e7));
+//! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
 mod cloud;
+mod contents;
 mod crs;
 mod error;
+mod files;
 mod geographic;
+mod guard;
 mod identity;
-mod las;
 mod memory;
 mod merge;
 mod moved;
+mod precision;
 mod progress;
 mod random;
-mod read;
 mod retain;
 mod sample;
-mod source;
 mod thin;
-mod write;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
-pub use crs::{Crs, GeoKeys, Unit};
-pub use error::Error;
+pub use contents::Contents;
+pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
+pub use error::{Error, excerpt, one_line};
+pub use files::{Bytes, temporary_beside, write_whole};
 pub use geographic::LocalMetres;
 /// Vector library of the public interface.
 pub use glam;
+pub use guard::guard;
 pub use memory::{available_memory, check_memory};
-pub use progress::Progress;
-pub use read::{
-    Attribute, Contents, DepthCamera, Description, ReadOptions, describe, describe_bytes, formats, read, read_bytes,
-    read_mesh, read_mesh_bytes, read_with,
-};
-pub use sample::sample_surface;
-#[cfg(feature = "zenoh")]
-pub use source::remote;
-pub use source::{
-    PlayOptions, Source,
-    align::beginnings,
-    animation::{Animation, Playback},
-    latest::{Arrival, Latest, LatestOptions, LatestStatistics},
-    live::{Live, LiveOptions},
-    player::Player,
-    point_cloud2,
-    recording::{Recording, RecordingOptions, RecordingSummary, RecordingTopic, describe_recording, is_recording},
-    scanner::Scanner,
-    scene::{Hit, Scene, View, parse_count},
-    stream::{Next, Statistics, Stream, Timeline, Update},
-};
-pub use write::{check_writable, write, written_formats};
+pub use merge::normal_matrix;
+pub use precision::{residual, sampled_middle, storage_origin};
+pub use progress::{Part, Progress};
+pub use random::Random;
+pub use sample::{SurfaceSamples, sample_surface};

@@ -6,7 +6,9 @@ use glam::{DMat3, DMat4, DVec3};
 use rayon::prelude::*;
 
 use crate::{
-    Crs, Field, FieldValues, PointCloud, Scan, cloud::each_type, identity::Identity, read::SMALL, read::middle,
+    Crs, Field, FieldValues, PointCloud, Scan, each_type,
+    identity::Identity,
+    precision::{residual, storage_origin},
 };
 
 /// Colour of the points of a part without colours, if another part has colours.
@@ -125,7 +127,7 @@ impl PointCloud {
 
 /// The matrix that transforms normals if `matrix` transforms positions: the inverse transpose times the positive |det|.
 /// This cofactor form exists for singular matrices too.
-pub(crate) fn normal_matrix(matrix: DMat3) -> DMat3 {
+pub fn normal_matrix(matrix: DMat3) -> DMat3 {
     let DMat3 { x_axis: x, y_axis: y, z_axis: z } = matrix;
     let sign = if matrix.determinant() < 0.0 { -1.0 } else { 1.0 };
     DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign
@@ -170,22 +172,15 @@ pub(crate) fn turn(fields: &mut [Field], points: Range<usize>, pose: &DMat4, whi
     }
 }
 
-/// What rounding a position to `f32` loses.
-pub(crate) fn residual(position: DVec3) -> [f32; 3] {
-    let lost = (position - position.as_vec3().as_dvec3()).as_vec3();
-    // Infinite and NaN positions have no residual.
-    if lost.is_finite() { lost.to_array() } else { [0.0; 3] }
-}
-
 fn common_origin(parts: &[(&PointCloud, DMat4)]) -> DVec3 {
     let first = parts[0].0.origin();
     if parts.iter().all(|(cloud, pose)| *pose == DMat4::IDENTITY && cloud.origin() == first) {
         return first;
     }
     let far = parts.iter().find_map(|(cloud, pose)| {
-        let middle = middle(cloud.len(), |i| pose.transform_point3(cloud.world_position(i)));
+        let origin = storage_origin(cloud.len(), |i| pose.transform_point3(cloud.world_position(i)));
         let own = *pose == DMat4::IDENTITY && cloud.origin() != DVec3::ZERO;
-        (middle.abs().max_element() >= SMALL).then_some(if own { cloud.origin() } else { middle })
+        (origin != DVec3::ZERO).then_some(if own { cloud.origin() } else { origin })
     });
     far.unwrap_or(DVec3::ZERO)
 }

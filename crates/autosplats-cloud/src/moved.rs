@@ -3,11 +3,7 @@
 use glam::{DMat4, DVec3};
 use rayon::prelude::*;
 
-use crate::{
-    Field, FieldValues, LocalMetres, PointCloud, Scan,
-    identity::Identity,
-    merge::{residual, turn},
-};
+use crate::{Field, FieldValues, LocalMetres, PointCloud, Scan, identity::Identity, merge::turn, precision::residual};
 
 impl PointCloud {
     /// Copies the points with the given indices, in ascending order, with all attributes to a new cloud.

@@ -11,7 +11,7 @@ use crate::{Error, PointCloud};
 /// ```
 /// use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 ///
-/// use autosplats_cloud::{Error, Progress, ReadOptions, read_bytes};
+/// use autosplats_cloud::{Error, PointCloud, Progress, glam::DVec3};
 ///
 /// struct Terminal {
 ///     stop: AtomicBool,
@@ -32,10 +32,11 @@ use crate::{Error, PointCloud};
 /// }
 ///
 /// let terminal = Terminal { stop: AtomicBool::new(false) };
-/// let read = || read_bytes("a.xyz".as_ref(), b"1 2 3\n", &ReadOptions::default(), &terminal);
-/// assert_eq!(read()?.len(), 1);
+/// let mut cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3]; 9]);
+/// cloud.thin_by_voxel(1.0, &terminal)?;
+/// assert_eq!(cloud.len(), 1);
 /// terminal.stop.store(true, Relaxed);
-/// assert!(matches!(read(), Err(Error::Cancelled)));
+/// assert!(matches!(cloud.thin_by_voxel(1.0, &terminal), Err(Error::Cancelled)));
 /// # Ok::<(), Error>(())
 /// ```
 pub trait Progress: Sync {
@@ -45,6 +46,18 @@ pub trait Progress: Sync {
     /// Whether to stop; asked many times a second. Cancelled work ends with [`Error::Cancelled`].
     fn cancelled(&self) -> bool {
         false
+    }
+
+    /// Reports `fraction`, unless the work is cancelled.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    fn tick(&self, fraction: f32) -> Result<(), Error> {
+        if self.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        self.report(fraction);
+        Ok(())
     }
 
     /// Called with a note for the user that is no error: what was dropped, guessed or cannot be kept. A note is one
@@ -68,20 +81,14 @@ impl Progress for () {
     fn report(&self, _fraction: f32) {}
 }
 
-/// Reports `fraction`, or fails with [`Error::Cancelled`] if the caller cancels.
-pub(crate) fn tick(progress: &dyn Progress, fraction: f32) -> Result<(), Error> {
-    if progress.cancelled() {
-        return Err(Error::Cancelled);
-    }
-    progress.report(fraction);
-    Ok(())
-}
-
-/// Progress of one step of the work: maps the step's 0 to 1 to a range of the whole.
-pub(crate) struct Part<'a> {
-    pub(crate) whole: &'a dyn Progress,
-    pub(crate) start: f32,
-    pub(crate) len: f32,
+/// Progress of one step of the work: maps the step's 0 to 1 to a range of the whole. Passes no chunks on.
+pub struct Part<'a> {
+    /// Progress of the whole work.
+    pub whole: &'a dyn Progress,
+    /// Fraction of the whole at which the step begins.
+    pub start: f32,
+    /// Fraction of the whole that the step takes.
+    pub len: f32,
 }
 
 impl Progress for Part<'_> {

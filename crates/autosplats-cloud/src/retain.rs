@@ -1,8 +1,12 @@
 //! Removing points from a cloud.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{PointCloud, cloud::each_type, identity::Identity};
+use crate::{PointCloud, each_type, identity::Identity};
+
+/// Points checked for zeros as one piece of parallel work.
+const BLOCK: usize = 1 << 14;
 
 impl PointCloud {
     /// Keeps the points for which `keep`, called with their index, is true. Order and attributes are kept.
@@ -34,6 +38,27 @@ impl PointCloud {
         for field in &mut self.fields {
             each_type!(&mut field.values, v => compact(v, &keep));
         }
+    }
+
+    /// Removes the points at (0, 0, 0), which scanners write for missing returns, if `accepts` is true of their number.
+    /// Returns the number of removed points.
+    pub fn drop_no_returns(&mut self, accepts: impl Fn(usize) -> bool) -> usize {
+        // With the origin at zero, positions are world coordinates. A zero has no bit set but the sign.
+        let exact = self.origin == DVec3::ZERO && self.residuals.is_none();
+        let zero = |[x, y, z]: &[f32; 3]| (x.to_bits() | y.to_bits() | z.to_bits()) << 1 == 0;
+        let absent = |i: usize| if exact { zero(&self.positions[i]) } else { self.world_position(i) == DVec3::ZERO };
+        let count = if exact {
+            let zeros = |points: &[[f32; 3]]| points.iter().map(|point| usize::from(zero(point))).sum::<usize>();
+            self.positions.par_chunks(BLOCK).map(zeros).sum()
+        } else {
+            (0..self.len()).into_par_iter().filter(|&i| absent(i)).count()
+        };
+        if count == 0 || !accepts(count) {
+            return 0;
+        }
+        let keep: Vec<bool> = (0..self.len()).into_par_iter().map(|i| !absent(i)).collect();
+        self.retain(|i| keep[i]);
+        count
     }
 
     /// Updates the ranges of the scans in one pass over the points: there may be as many scans as points.

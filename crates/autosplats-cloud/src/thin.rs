@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{Error, PointCloud, Progress, identity::Identity, merge::residual, progress::tick};
+use crate::{Error, PointCloud, Progress, identity::Identity, precision::residual, random::Random};
 
 /// Points processed between two checks for cancellation.
 const BLOCK: usize = 1 << 20;
@@ -64,7 +64,7 @@ impl PointCloud {
         if !(size > 0.0 && size.is_finite()) {
             return Err(Error::BadValue { name: "voxel size", value: size, rule: "above 0" });
         }
-        tick(progress, 0.0)?;
+        progress.tick(0.0)?;
         let mut cells: Vec<([i64; 3], u32)> = (0..self.len())
             .into_par_iter()
             .filter_map(|i| {
@@ -75,10 +75,10 @@ impl PointCloud {
         if cells.par_iter().any(|(cell, _)| cell.iter().any(|&value| value.unsigned_abs() > 1 << 52)) {
             return Err(Error::BadValue { name: "voxel size", value: size, rule: "larger for these coordinates" });
         }
-        tick(progress, 0.2)?;
+        progress.tick(0.2)?;
         // Sorting puts the points of a cube side by side, in the file's order.
         cells.par_sort_unstable();
-        tick(progress, 0.8)?;
+        progress.tick(0.8)?;
         let mut keep = vec![false; self.len()];
         for cube in cells.chunk_by(|(a, _), (b, _)| a == b) {
             let point = |&(_, index): &([i64; 3], u32)| self.world_position(index as usize) - self.origin;
@@ -91,7 +91,7 @@ impl PointCloud {
         }
         drop(cells);
         self.retain(|i| keep[i]);
-        tick(progress, 1.0)
+        progress.tick(1.0)
     }
 
     /// Adds normally distributed noise of standard deviation `sigma` to every point, along each axis, in the file's
@@ -106,7 +106,7 @@ impl PointCloud {
         self.resolution = None;
         self.identity = Identity::default();
         for start in (0..self.len()).step_by(BLOCK) {
-            tick(progress, start as f32 / self.len() as f32)?;
+            progress.tick(start as f32 / self.len() as f32)?;
             let end = self.len().min(start + BLOCK);
             let moved = |i: usize| self.world_position(i) - self.origin + sigma * normal(seed, i as u64);
             let moved: Vec<DVec3> = (start..end).into_par_iter().map(moved).collect();
@@ -117,21 +117,15 @@ impl PointCloud {
                 residuals[start..end].iter_mut().zip(&moved).for_each(|(lost, moved)| *lost = residual(*moved));
             }
         }
-        tick(progress, 1.0)
+        progress.tick(1.0)
     }
 }
 
 /// Three normally distributed numbers, by the Box-Muller method.
 fn normal(seed: u64, index: u64) -> DVec3 {
-    let mut state = seed ^ index.wrapping_mul(0xd134_2543_de82_ef95);
-    let mut unit = || {
-        // Splitmix64; the result is above 0 and at most 1.
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (((z ^ (z >> 31)) >> 11) + 1) as f64 / (1_u64 << 53) as f64
-    };
+    let mut random = Random::numbered(seed, index);
+    // Above 0 and at most 1.
+    let mut unit = || ((random.bits() >> 11) + 1) as f64 / (1_u64 << 53) as f64;
     let mut pair = || {
         let (radius, angle) = ((-2.0 * unit().ln()).sqrt(), std::f64::consts::TAU * unit());
         [radius * angle.cos(), radius * angle.sin()]

@@ -7,6 +7,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
 
 use autosplats::Image;
+use autosplats::cloud::temporary_beside;
 use tempfile::TempPath;
 
 use crate::Error;
@@ -134,13 +135,7 @@ impl Drop for Film {
 fn temporary(path: &Path) -> std::io::Result<TempPath> {
     let mut suffix = OsString::from(".");
     suffix.push(path.extension().unwrap_or_default());
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".autosplats-").suffix(&suffix);
-    // Temporary files are private by default; a film has usual permissions.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    Ok(builder.tempfile_in(folder)?.into_temp_path())
+    Ok(temporary_beside(path, suffix)?.into_temp_path())
 }
 
 /// The command that makes a film of raw pictures.

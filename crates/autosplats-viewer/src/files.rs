@@ -1,10 +1,10 @@
 //! The one place that asks the system for files, since a browser has none.
 
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 
 use autosplats::Image;
+use autosplats::cloud::write_whole;
 use eframe::egui;
 
 use crate::threads::spawn;
@@ -21,7 +21,7 @@ pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Option<Vec<Pat
     let context = context.clone();
     spawn("dialog", move || {
         let extensions: Vec<&str> =
-            autosplats::cloud::formats().flat_map(|(_, extensions)| extensions).copied().collect();
+            autosplats_formats::formats().flat_map(|(_, extensions)| extensions).copied().collect();
         let dialog =
             rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
         // Tests have no user to ask.
@@ -67,31 +67,12 @@ pub(crate) fn encode_png(picture: &Image, writer: &mut dyn std::io::Write) -> st
     .map_err(std::io::Error::other)
 }
 
-/// A temporary file in the folder of `path`, to be renamed once complete.
-pub(crate) fn temporary(path: &Path, suffix: &OsStr) -> std::io::Result<tempfile::NamedTempFile> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".autosplats-").suffix(suffix);
-    // By default, temporary files are private to their owner; the result should have usual permissions.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
-}
-
 /// Writes a file atomically: it appears complete or not at all.
 pub(crate) fn write(
     path: &Path,
     content: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
-    use std::io::Write as _;
-    let mut file = temporary(path, OsStr::new(".tmp"))?;
-    {
-        let mut writer = std::io::BufWriter::new(file.as_file_mut());
-        content(&mut writer)?;
-        writer.flush()?;
-    }
-    file.persist(path).map_err(|error| error.error)?;
-    Ok(())
+    write_whole(path, |error| error, |file| content(file))
 }
 
 #[cfg(test)]

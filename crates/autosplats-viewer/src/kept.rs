@@ -3,8 +3,10 @@
 use std::path::Path;
 use std::time::Duration;
 
+use autosplats::cloud::Error;
 use autosplats::cloud::glam::DMat4;
-use autosplats::cloud::{DepthCamera, Error, LatestOptions, PlayOptions, ReadOptions};
+use autosplats_formats::{DepthCamera, ReadOptions};
+use autosplats_sources::{LatestOptions, PlayOptions, Source};
 use serde::{Deserialize, Serialize};
 
 use crate::app::App;
@@ -114,8 +116,11 @@ impl StoredInput {
     /// [`Error::UnknownScene`] and [`Error::BadScene`].
     pub(crate) fn open(self, folder: &Path) -> Result<(Input, Appearance), Error> {
         let Self { source, visible, tint, pose, options, play } = self;
-        let address = source.starts_with("scene:") || source.contains("://");
-        let input = Input::parse(&if address { source } else { folder.join(source).display().to_string() })?;
+        let input = Input::parse(&if Source::is_address(&source) {
+            source
+        } else {
+            folder.join(source).display().to_string()
+        })?;
         let (played, play) = (play.played, play.options());
         let input = Input { world_from_input: pose, options: options.options(), played, play, ..input };
         Ok((input, Appearance { visible, tint }))

@@ -7,7 +7,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use autosplats::cloud::glam::DMat4;
-use autosplats::cloud::{Error, PlayOptions, PointCloud, Progress, ReadOptions, Source};
+use autosplats::cloud::{Error, PointCloud, Progress};
+use autosplats_formats::ReadOptions;
+use autosplats_sources::{PlayOptions, Source};
 use eframe::egui;
 
 use crate::glance::{FirstLook, SharedViewFrame, ViewFrame};

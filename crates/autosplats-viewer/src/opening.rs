@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use autosplats::cloud::{PointCloud, Source};
+use autosplats::cloud::PointCloud;
 use autosplats::{Camera, Projection, ViewDirection};
+use autosplats_sources::Source;
 
 use crate::app::App;
 use crate::document::{Layer, LayerId};

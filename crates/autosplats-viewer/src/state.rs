@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use autosplats::Camera;
-use autosplats::cloud::{Axes, Source};
+use autosplats::cloud::Axes;
+use autosplats_sources::Source;
 use serde::{Deserialize, Serialize};
 
 use crate::app::App;
@@ -158,8 +159,8 @@ pub(crate) fn folder(path: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use autosplats::cloud::ReadOptions;
     use autosplats::cloud::glam::{DMat4, DQuat, DVec3};
+    use autosplats_formats::ReadOptions;
 
     use super::*;
     use crate::Input;

@@ -7,9 +7,10 @@
 #[allow(dead_code, reason = "others use the rest")]
 mod common;
 
+use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::{DQuat, DVec3};
-use autosplats::cloud::{PointCloud, Scene};
 use autosplats::{Backend, Camera, Reconstruction, Renderer, Settings, Timings};
+use autosplats_scenes::Scene;
 
 use common::{SIZE, args, machine, median, scene, short};
 

@@ -13,7 +13,7 @@ mod common;
 use std::{hint::black_box, num::NonZero, time::Instant};
 
 use autosplats::cloud::{
-    PointCloud,
+    PointCloud, Random,
     glam::{DVec3, Vec3},
 };
 use autosplats::{Camera, Projection, Reconstruction, Renderer, Settings};
@@ -204,10 +204,7 @@ fn sheet(points: usize) -> (PointCloud, Camera) {
 
 /// A pseudo-random number for each number, all different.
 fn scrambled(number: u64) -> u64 {
-    let mut bits = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    bits ^ bits >> 31
+    Random::from_state(number).bits()
 }
 
 /// The cloud with its points sorted by a key of their index and position.

@@ -4,19 +4,16 @@
 
 use autosplats_cloud::glam::{DQuat, DVec3};
 
-/// Reproducible random numbers (SplitMix64).
-pub(crate) struct Random(u64);
+/// Reproducible random numbers in `f32`.
+pub(crate) struct Random(autosplats_cloud::Random);
 
 impl Random {
     pub(crate) fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(autosplats_cloud::Random::from_state(seed))
     }
 
     pub(crate) fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.bits()
     }
 
     /// Within 0..1.
@@ -36,7 +33,7 @@ impl Random {
     }
 
     pub(crate) fn below(&mut self, end: usize) -> usize {
-        (self.bits() % end as u64) as usize
+        self.0.modulo(end)
     }
 
     /// A unit vector; all directions are equally likely.

@@ -13,7 +13,7 @@ use autosplats_quality::measure::{Angles, Measures};
 use autosplats_quality::method::{Method, Painter};
 use autosplats_quality::motion::{Change, Changes, same};
 use autosplats_quality::picture::{DrawnSurface, Picture};
-use autosplats_quality::random::Random;
+use autosplats_quality::random::random;
 use autosplats_quality::run::{Outcome, Pictures, measure, movement};
 use autosplats_quality::still::Still;
 use autosplats_quality::subject::Subject;
@@ -267,7 +267,7 @@ impl Measured {
 
     /// The limits that the picture misses if one in `one_in` of its pixels is changed.
     fn misses_of_spoilt(&self, one_in: usize, change: impl Fn(DrawnSurface) -> Option<DrawnSurface>) -> String {
-        let is_chosen = |pixel| Random::new(5, pixel).unit() < 1.0 / one_in as f64;
+        let is_chosen = |pixel| random(5, pixel).unit() < 1.0 / one_in as f64;
         self.misses(&self.picture().changed(|pixel, shown| if is_chosen(pixel) { change(shown) } else { Some(shown) }))
     }
 }
@@ -376,7 +376,7 @@ fn noise_in_colors_is_noticed() {
     let sample = sample();
     let lit = &sample.pictures.drawn[0].2;
     let noisy = lit.changed(|pixel, color| {
-        let noise = 0.05 * Random::new(6, pixel).gauss();
+        let noise = 0.05 * random(6, pixel).normal();
         color.map(|channel| (channel + noise).clamp(0.0, 1.0))
     });
     let misses = sample.lit_misses(sample.picture(), &noisy);
@@ -394,7 +394,7 @@ fn a_jittering_picture_is_noticed() {
     assert!(pairs.len() > 10_000 && pairs.iter().all(|(from, to)| from == to), "every pixel shows the same point");
     let wobbling = |step: usize| {
         sample.picture().changed(|pixel, shown| {
-            let turn = TAU * Random::new(7 + step as u64, pixel).unit();
+            let turn = TAU * random(7 + step as u64, pixel).unit();
             let axis = DVec3::new(turn.cos(), turn.sin(), 0.0);
             Some(DrawnSurface { normal: DQuat::from_axis_angle(axis, 2.0_f64.to_radians()) * shown.normal, ..shown })
         })

@@ -7,7 +7,7 @@ use autosplats_quality::exact::Exact;
 use autosplats_quality::light::Lit;
 use autosplats_quality::measure::{Swept, Truth};
 use autosplats_quality::picture::{DrawnSurface, Picture};
-use autosplats_quality::random::Random;
+use autosplats_quality::random::random;
 use autosplats_quality::subject::{Recipe, Source, Subject};
 use autosplats_quality::sweep::Sweep;
 use autosplats_quality::view::Shot;
@@ -123,7 +123,7 @@ fn what_is_missing_wrong_or_too_much_is_noticed() {
     assert!((0.3..0.7).contains(&seen), "horses hide parts, and the lidar has a blind spot: {seen}");
     assert_eq!([closed, all_right, over], [1.0, 1.0, 0.0], "the true picture has no errors");
 
-    let is_chosen = |pixel| Random::new(8, pixel).unit() < 0.2;
+    let is_chosen = |pixel| random(8, pixel).unit() < 0.2;
     let near = |value: f64, expected: f64| (value - expected).abs() < 0.02;
     let gaps = measure(&right.changed(|pixel, shown| (!is_chosen(pixel)).then_some(shown)));
     assert!(near(gaps.closed, 0.8) && near(gaps.right, 0.8) && gaps.over == 0.0, "a fifth is missing: {gaps:?}");

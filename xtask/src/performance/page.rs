@@ -32,7 +32,7 @@ const TABLES: [[&str; 4]; 5] = [
         "Other programs",
         "*times* is their time over ours. kiddo: `cargo bench -p autosplats --bench kd_tree`, ten neighbours of \
          visible points, medians of ratios. Normals: `--bench normals`, Open3D and pymeshlab by hand. Readers: `cargo \
-         bench -p autosplats-cloud --bench peers`, 2 million points, best of three. The paper's engines beside the \
+         bench -p autosplats-formats --bench peers`, 2 million points, best of three. The paper's engines beside the \
          screen grid, on the GPU: `autosplats bench paper`.",
         "task program",
         "ms ours times",

@@ -2,7 +2,7 @@
 
 use autosplats::NormalSettings;
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::written_formats;
+use autosplats_formats::written_formats;
 use clap::Args;
 
 use super::input::INPUT_HELP;

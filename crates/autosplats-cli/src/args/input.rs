@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use autosplats_cloud::DepthCamera;
+use autosplats_formats::DepthCamera;
 use clap::Args;
 
 use crate::values;

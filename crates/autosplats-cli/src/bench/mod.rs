@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use autosplats::{Counts, PassTime, Renderer, Settings, Timings};
 use autosplats_cloud::PointCloud;
+use autosplats_scenes::SCENE_PREFIX;
 use serde::Serialize;
 
 use self::args::{BenchArgs, Evaluation};
@@ -91,7 +92,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     settings.reconstruction.trim = !no_trim;
     settings.reconstruction.engine = engine.with_first_radius(*first_radius);
     settings.check().map_err(render_failure)?;
-    let name = scene.strip_prefix("scene:").unwrap_or(scene);
+    let name = scene.strip_prefix(SCENE_PREFIX).unwrap_or(scene);
     let inputs = Inputs::scene(name)?;
     // Missing devices fail before points are generated.
     let mut renderers = Vec::new();

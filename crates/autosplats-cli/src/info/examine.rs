@@ -5,10 +5,10 @@ use std::sync::{Mutex, PoisonError};
 
 use autosplats::guess_axes;
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{
-    Attribute, Description, Error, FieldValues, PlayOptions, PointCloud, Progress, ReadOptions, RecordingSummary,
-    Scene, Source, Unit, check_memory, describe, describe_recording, read_with,
-};
+use autosplats_cloud::{Error, FieldValues, PointCloud, Progress, Unit, check_memory};
+use autosplats_formats::{Attribute, Description, ReadOptions, describe, read_with};
+use autosplats_scenes::Scene;
+use autosplats_sources::{PlayOptions, RecordingSummary, Source, describe_recording};
 use rayon::prelude::*;
 
 use super::report::{AttributeFound, AxesFound, Bounds, CrsFound, Detail, Report, ScanFound};
@@ -16,7 +16,7 @@ use super::spacing;
 use super::statistics::{Statistics, Values};
 use crate::args::InputArgs;
 use crate::exit::Failure;
-use crate::input::{FIRST_POINTS_TIMEOUT, Inputs, read_failure};
+use crate::input::{Inputs, read_failure};
 use crate::progress::Bar;
 
 /// Size in bytes from which files are read one at a time. Reading one uses all cores, and two might not fit into
@@ -114,7 +114,7 @@ impl Examiner {
             let seconds = timeline.duration().as_secs_f64();
             report.details.insert(0, detail("frames", format!("{} in {seconds:.2} s", timeline.len())));
         }
-        let cloud = player.first(FIRST_POINTS_TIMEOUT, &listener)?;
+        let cloud = player.first(Source::FIRST_POINTS_TIMEOUT, &listener)?;
         for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
             report.warn(note);
         }

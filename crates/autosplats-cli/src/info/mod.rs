@@ -11,7 +11,7 @@ use std::io::{IsTerminal as _, stdout};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 
-use autosplats_cloud::ReadOptions;
+use autosplats_formats::ReadOptions;
 
 use self::examine::{Examination, Examiner};
 pub(crate) use self::report::SCHEMA;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use autosplats_cloud::PointCloud;
+use autosplats_cloud::{PointCloud, Random};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -53,7 +53,7 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
     let sampled: Vec<_> = (0..samples)
         .map(|i| {
             let (start, end) = (part(i), part(i + 1));
-            points[start + (mix(i as u64) % (end - start) as u64) as usize]
+            points[start + Random::from_state(i as u64).modulo(end - start)]
         })
         .collect();
 
@@ -92,20 +92,12 @@ pub(super) fn duplicates(cloud: &PointCloud) -> u64 {
     let hash = |i: usize| {
         let position = cloud.world_position(i);
         // Adding 0 turns -0 into 0.
-        let hash = |hash: u64, value: f64| mix(hash ^ (value + 0.0).to_bits());
+        let hash = |hash: u64, value: f64| Random::from_state(hash ^ (value + 0.0).to_bits()).bits();
         position.is_finite().then(|| position.to_array().into_iter().fold(1, hash))
     };
     let mut hashes: Vec<u64> = (0..cloud.len()).into_par_iter().filter_map(hash).collect();
     hashes.par_sort_unstable();
     hashes.par_windows(2).filter(|pair| pair[0] == pair[1]).count() as u64
-}
-
-/// SplitMix64: a pseudo-random number.
-fn mix(seed: u64) -> u64 {
-    let z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 /// A k-d tree over a slice of points that it has reordered. Each half of a node's points belongs to one child.
@@ -190,7 +182,7 @@ mod tests {
     use super::*;
 
     fn random(count: u64) -> Vec<[f32; 3]> {
-        let unit = |seed: u64| (mix(seed) >> 40) as f32 / (1 << 24) as f32;
+        let unit = |seed: u64| (Random::from_state(seed).bits() >> 40) as f32 / (1 << 24) as f32;
         (0..count).map(|i| [unit(3 * i) * 10.0, unit(3 * i + 1), 0.1 * unit(3 * i + 2)]).collect()
     }
 

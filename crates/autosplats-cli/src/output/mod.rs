@@ -8,8 +8,8 @@ use std::fs::{File, metadata};
 use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write, stdout};
 use std::path::{Path, PathBuf};
 
-use autosplats_cloud::{Error, PointCloud, check_writable};
-use tempfile::NamedTempFile;
+use autosplats_cloud::{Error, PointCloud, temporary_beside, write_whole};
+use autosplats_formats::check_writable;
 
 pub(crate) use self::exr::write_exr;
 pub(crate) use self::png::write_png;
@@ -49,40 +49,30 @@ pub(crate) fn check_target(path: &Path, inputs: &ReadFiles) -> Result<(), Failur
     inputs.check(path)?;
     // Creating a file is the only reliable check that one can be created.
     let _writing = interrupt::writing();
-    temporary_in(folder)
+    temporary_beside(path, ".tmp")
         .map_err(|error| cannot_write(path, &error))?
         .close()
         .map_err(|error| cannot_write(path, &error))
 }
 
-/// Writes a file through `write` and returns its size in bytes.
+/// Writes a file atomically through `write`, and returns its size in bytes.
 pub(crate) fn write_file(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<Stoppable<'_>>) -> std::io::Result<()>,
 ) -> Result<u64, Failure> {
-    replace_file(path, |temporary| {
-        let mut writer = BufWriter::with_capacity(1 << 18, Stoppable(temporary.as_file_mut()));
-        write(&mut writer).and_then(|()| writer.flush()).map_err(|error| cannot_write(path, &error))
-    })
-}
-
-/// Replaces a file atomically and returns its size in bytes. `fill` writes to a temporary file in the same folder,
-/// which is then renamed.
-pub(crate) fn replace_file(
-    path: &Path,
-    fill: impl FnOnce(&mut NamedTempFile) -> Result<(), Failure>,
-) -> Result<u64, Failure> {
     // A symbolic link stays, and its target is replaced.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let failed = |error: std::io::Error| cannot_write(path, &error);
     let _writing = interrupt::writing();
-    let mut temporary = temporary_in(folder_of(&target)).map_err(|error| cannot_write(path, &error))?;
-    let filled = fill(&mut temporary);
-    if interrupt::requested() {
-        return Err(Failure::interrupted());
-    }
-    filled?;
-    temporary.persist(&target).map_err(|error| cannot_write(path, &error.error))?;
-    metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error))
+    write_whole(&target, failed, |file| {
+        let mut writer = BufWriter::with_capacity(1 << 18, Stoppable(file.get_mut()));
+        let written = write(&mut writer).and_then(|()| writer.flush());
+        if interrupt::requested() {
+            return Err(Failure::interrupted());
+        }
+        written.map_err(failed)
+    })?;
+    metadata(&target).map(|metadata| metadata.len()).map_err(failed)
 }
 
 /// Writes a cloud atomically in the format of the path's extension. Returns the file's size in bytes.
@@ -91,7 +81,7 @@ pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, quiet: bool) -> Resul
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let bar = Bar::on_file("writing", path, quiet);
     let _writing = interrupt::writing();
-    match autosplats_cloud::write(cloud, &target, &bar) {
+    match autosplats_formats::write(cloud, &target, &bar) {
         Ok(()) => metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
         Err(Error::Cancelled) => Err(Failure::interrupted()),
         Err(Error::Io { source, .. }) => Err(cannot_write(path, &source)),
@@ -156,15 +146,6 @@ fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
 
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-fn temporary_in(folder: &Path) -> std::io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".autosplats-").suffix(".tmp");
-    // By default, temporary files are private to their owner; an output should have usual permissions.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
 }
 
 #[derive(Clone, Debug)]

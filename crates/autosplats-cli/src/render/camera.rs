@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{Axes, PointCloud, Scene, View};
+use autosplats_cloud::{Axes, PointCloud};
+use autosplats_scenes::{Scene, View};
 use serde_json::error::Category;
 
 use super::render_failure;

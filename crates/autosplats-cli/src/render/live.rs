@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use autosplats::{Camera, Renderer};
-use autosplats_cloud::{Error, Player, PointCloud, Statistics};
+use autosplats_cloud::{Error, PointCloud};
 use autosplats_film::Target;
+use autosplats_sources::{Player, Statistics};
 
 use super::film::{FilmJob, FrameTally, picture};
 use super::job::Job;

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use autosplats::{Camera, ColorMode, Renderer};
 use autosplats_cloud::glam::DMat4;
-use autosplats_cloud::{Axes, LocalMetres, PointCloud, Progress, Timeline};
+use autosplats_cloud::{Axes, LocalMetres, PointCloud, Progress};
+use autosplats_sources::Timeline;
 
 use super::job::Job;
 use crate::exit::{Exit, Failure};

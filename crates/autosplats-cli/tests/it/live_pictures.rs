@@ -12,14 +12,10 @@ use std::{
     time::{Duration, Instant, UNIX_EPOCH},
 };
 
-use autosplats::{
-    Camera, Projection, Renderer, Settings, ViewDirection,
-    cloud::{
-        Latest, LatestOptions, Next, Stream as _,
-        glam::DMat4,
-        remote::{Remote, RemoteOptions},
-    },
-    guess_axes,
+use autosplats::{Camera, Projection, Renderer, Settings, ViewDirection, cloud::glam::DMat4, guess_axes};
+use autosplats_sources::{
+    Latest, LatestOptions, Next, Stream as _,
+    remote::{Remote, RemoteOptions},
 };
 
 const POINTS: usize = 100_000;

@@ -1,18 +1,6 @@
 //! Keys of GeoTIFF headers, which LAS 1.0 to 1.3 use for coordinate systems.
 
-use super::{Crs, Found, Unit};
-
-/// Keys of a GeoTIFF header with their parameters, as stored in its three tags.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct GeoKeys {
-    /// The key directory: version, revision, minor revision, number of keys; then four numbers per key. These are its
-    /// number, the tag of its value (0: in the directory), the count of values, and the value or the first one's index.
-    pub directory: Vec<u16>,
-    /// The floating-point values that keys refer to.
-    pub doubles: Vec<f64>,
-    /// The texts that keys refer to, each ending with `|`.
-    pub ascii: String,
-}
+use super::definition::{Crs, CrsDefinition, GeoKeys, Unit};
 
 const MODEL: u16 = 1024;
 const CITATION: u16 = 1026;
@@ -34,7 +22,7 @@ const USER_DEFINED: u16 = 32767;
 
 impl GeoKeys {
     /// Decodes the contents of the three tags.
-    pub(crate) fn from_bytes(directory: &[u8], doubles: &[u8], ascii: &[u8]) -> Self {
+    pub fn from_bytes(directory: &[u8], doubles: &[u8], ascii: &[u8]) -> Self {
         Self {
             directory: directory.as_chunks().0.iter().map(|raw| u16::from_le_bytes(*raw)).collect(),
             doubles: doubles.as_chunks().0.iter().map(|raw| f64::from_le_bytes(*raw)).collect(),
@@ -68,7 +56,7 @@ impl GeoKeys {
     }
 
     /// Decodes the coordinate system.
-    pub(crate) fn read(&self) -> Found {
+    pub fn read(&self) -> CrsDefinition {
         let code = |key| self.number(key).filter(|&code| code != 0 && code != USER_DEFINED).map(u32::from);
         let model = self.number(MODEL);
         let projected = code(PROJECTED);
@@ -101,11 +89,11 @@ impl GeoKeys {
             vertical_unit: vertical.filter(|&vertical| Some(vertical) != unit),
             geotiff: Some(self.clone()),
         };
-        Found { crs, geocentric: model == Some(3), heights: vertical }
+        CrsDefinition { crs, geocentric: model == Some(3), heights: vertical }
     }
 
     /// Keys that state what is known of a coordinate system.
-    pub(crate) fn describe(crs: &Crs) -> Self {
+    pub fn describe(crs: &Crs) -> Self {
         let degrees = crs.unit == Some(Unit::Degree);
         let code = crs.epsg.and_then(|code| u16::try_from(code).ok()).unwrap_or(USER_DEFINED);
         let mut keys = vec![[MODEL, 0, 1, if degrees { 2 } else { 1 }], [1025, 0, 1, 1]];

@@ -2,12 +2,26 @@
 //!
 //! The text is a tree: a keyword with values in brackets, some of which are keywords with values again.
 
-use super::{Crs, Found, Unit};
+use super::definition::{Crs, CrsDefinition, Unit};
 
 /// Largest depth of brackets; deeper text is not parsed.
 const MAX_DEPTH: usize = 32;
 /// Largest length of parsed text, in bytes.
 const MAX_LEN: usize = 1 << 20;
+
+impl Crs {
+    /// Parses well-known text of version 1 or 2. Text that cannot be parsed is kept in `wkt`.
+    pub fn from_wkt(text: &str) -> Self {
+        CrsDefinition::from_wkt(text).crs
+    }
+}
+
+impl CrsDefinition {
+    /// Parses well-known text of version 1 or 2.
+    pub fn from_wkt(text: &str) -> Self {
+        read(text)
+    }
+}
 
 /// A keyword with its values.
 struct Node<'a> {
@@ -72,9 +86,10 @@ impl Node<'_> {
 }
 
 /// Parses a definition; `text` is kept even if it cannot be parsed.
-pub(super) fn read(text: &str) -> Found {
+fn read(text: &str) -> CrsDefinition {
     let text = text.trim_end_matches('\0').trim();
-    let mut found = Found { crs: Crs { wkt: Some(text.to_owned()), ..Crs::default() }, ..Found::default() };
+    let mut found =
+        CrsDefinition { crs: Crs { wkt: Some(text.to_owned()), ..Crs::default() }, ..CrsDefinition::default() };
     if text.is_empty() {
         found.crs.wkt = None;
     } else if text.len() <= MAX_LEN
@@ -82,7 +97,7 @@ pub(super) fn read(text: &str) -> Found {
     {
         system(&root, &mut found);
     }
-    let Found { crs, geocentric, heights } = &mut found;
+    let CrsDefinition { crs, geocentric, heights } = &mut found;
     *heights = if *geocentric { crs.unit } else { crs.vertical_unit };
     if crs.vertical_unit == crs.unit {
         crs.vertical_unit = None;
@@ -91,7 +106,7 @@ pub(super) fn read(text: &str) -> Found {
 }
 
 /// Stores name, code and units of a system. Parts of a compound system add only what is still unknown.
-fn system(node: &Node<'_>, found: &mut Found) {
+fn system(node: &Node<'_>, found: &mut CrsDefinition) {
     let crs = &mut found.crs;
     if node.is(&["BOUNDCRS", "SOURCECRS", "COORDINATEOPERATION"]) {
         node.children().take(1).for_each(|child| system(child, found));

@@ -13,13 +13,14 @@
 //! weighted by area. Only the half that contains the position is subdivided.
 
 mod surface_samples;
+mod triangle;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use self::surface_samples::Place;
-pub(crate) use self::surface_samples::SurfaceSamples;
-use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, progress, random::Random};
+pub use self::surface_samples::SurfaceSamples;
+use self::{surface_samples::Place, triangle::Triangle};
+use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, random::Random};
 
 /// Points computed between two checks for cancellation.
 const BLOCK: usize = 1 << 18;
@@ -49,10 +50,11 @@ const EXTRA_HALVINGS: i32 = 6;
 /// # Examples
 ///
 /// ```
-/// use autosplats_cloud::{ReadOptions, read_mesh_bytes, sample_surface};
+/// use autosplats_cloud::{Contents, PointCloud, glam::DVec3, sample_surface};
 ///
-/// let text = b"v 0 0 2\nv 1 0 2\nv 1 1 2\nv 0 1 2\nf 1 2 3 4\n";
-/// let mesh = read_mesh_bytes("square.obj".as_ref(), text, &ReadOptions::default(), &())?;
+/// let corners = vec![[0.0, 0.0, 2.0], [1.0, 0.0, 2.0], [1.0, 1.0, 2.0], [0.0, 1.0, 2.0]];
+/// let cloud = PointCloud::new(DVec3::ZERO, corners);
+/// let mesh = Contents { cloud, triangles: vec![[0, 1, 2], [0, 2, 3]] };
 /// let cloud = sample_surface(&mesh, 1000, 1, &())?;
 /// assert_eq!(cloud.len(), 1000);
 /// assert!(cloud.positions().iter().all(|[_, _, z]| *z == 2.0));
@@ -60,14 +62,17 @@ const EXTRA_HALVINGS: i32 = 6;
 /// ```
 pub fn sample_surface(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<PointCloud, Error> {
     let sampled = SurfaceSamples::new(mesh, count, seed, progress)?.on(&mesh.cloud, progress)?;
-    progress::tick(progress, 1.0)?;
+    progress.tick(1.0)?;
     Ok(sampled)
 }
 
 impl SurfaceSamples {
-    /// Computes places for `count` points on `mesh`.
-    pub(crate) fn new(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<Self, Error> {
-        progress::tick(progress, 0.0)?;
+    /// Computes places for `count` points on `mesh`, as [`sample_surface`] does.
+    ///
+    /// # Errors
+    /// Those of [`sample_surface`].
+    pub fn new(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<Self, Error> {
+        progress.tick(0.0)?;
         let cloud = &mesh.cloud;
         let value = |field: &Field| field.values.byte_len().checked_div(cloud.len()).unwrap_or(0);
         let per_point = 12 + 3 + size_of::<Place>() + cloud.fields().iter().map(value).sum::<usize>();
@@ -77,14 +82,14 @@ impl SurfaceSamples {
         if surface.area() <= 0.0 {
             return Err(Error::NoSurface);
         }
-        progress::tick(progress, 0.1)?;
+        progress.tick(0.1)?;
 
         let mut places: Vec<Place> = Vec::new();
         let bytes = count.saturating_mul(per_point);
         let full = |_| Error::OutOfMemory { what: format!("{count} points on a surface"), bytes };
         places.try_reserve_exact(count).map_err(full)?;
         for start in (0..count).step_by(BLOCK) {
-            progress::tick(progress, 0.1 + 0.7 * start as f32 / count as f32)?;
+            progress.tick(0.1 + 0.7 * start as f32 / count as f32)?;
             let pieces = (start..count.min(start + BLOCK)).into_par_iter().step_by(PIECE);
             let made: Vec<Vec<Place>> = pieces
                 .map(|first| surface.places(first..count.min(start + BLOCK).min(first + PIECE), count, seed))
@@ -92,43 +97,6 @@ impl SurfaceSamples {
             made.into_iter().for_each(|piece| places.extend(piece));
         }
         Ok(Self { vertices: cloud.len(), triangles: surface.triangles, places })
-    }
-}
-
-/// Corners in space. The curve runs from the first to the second.
-#[derive(Clone, Copy)]
-struct Triangle([DVec3; 3]);
-
-impl Triangle {
-    fn area(&self) -> f64 {
-        let [a, b, c] = self.0;
-        0.5 * (b - a).cross(c - a).length()
-    }
-
-    fn at(&self, second: f32, third: f32) -> DVec3 {
-        let [a, b, c] = self.0;
-        a + (b - a) * f64::from(second) + (c - a) * f64::from(third)
-    }
-
-    /// Weights of the second and third corner at the place of the triangle nearest to `point`.
-    fn nearest(&self, point: DVec3) -> DVec2 {
-        let [a, b, c] = self.0;
-        let (ab, ac, ap) = (b - a, c - a, point - a);
-        let (bb, bc, cc) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));
-        let (pb, pc) = (ap.dot(ab), ap.dot(ac));
-        let within = bb * cc - bc * bc;
-        let inner = DVec2::new(cc * pb - bc * pc, bb * pc - bc * pb) / within;
-        if inner.x >= 0.0 && inner.y >= 0.0 && inner.x + inner.y <= 1.0 {
-            return inner;
-        }
-        let clamp = |t: f64| if t > 0.0 { t.min(1.0) } else { 0.0 };
-        let on_ab = DVec2::new(clamp(pb / bb), 0.0);
-        let on_ac = DVec2::new(0.0, clamp(pc / cc));
-        let along = clamp((point - b).dot(c - b) / (c - b).length_squared());
-        let on_bc = DVec2::new(1.0 - along, along);
-        let distance = |weights: &DVec2| (ab * weights.x + ac * weights.y - ap).length_squared();
-        let nearest = [on_ab, on_ac, on_bc].into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.unwrap_or(DVec2::splat(1.0 / 3.0))
     }
 }
 

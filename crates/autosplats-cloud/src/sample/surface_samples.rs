@@ -3,11 +3,11 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::Triangle;
-use crate::{Error, Field, FieldValues, PointCloud, Progress, progress};
+use super::triangle::Triangle;
+use crate::{Error, Field, FieldValues, PointCloud, Progress};
 
 /// Places of points on the triangles of a mesh. The points follow the vertices if these move.
-pub(crate) struct SurfaceSamples {
+pub struct SurfaceSamples {
     /// Number of vertices of the mesh.
     pub(super) vertices: usize,
     /// Corners of the triangles that have an area, in the curve's order.
@@ -17,16 +17,19 @@ pub(crate) struct SurfaceSamples {
 
 impl SurfaceSamples {
     /// Whether the places were computed on a mesh with this number of vertices.
-    pub(crate) fn fits(&self, vertices: usize) -> bool {
+    pub fn fits(&self, vertices: usize) -> bool {
         self.vertices == vertices
     }
 
     /// The points on the mesh whose vertices are at the positions of `cloud`.
     ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` says so.
+    ///
     /// # Panics
     /// If `cloud` has fewer points than the mesh had vertices.
-    pub(crate) fn on(&self, cloud: &PointCloud, progress: &dyn Progress) -> Result<PointCloud, Error> {
-        progress::tick(progress, 0.8)?;
+    pub fn on(&self, cloud: &PointCloud, progress: &dyn Progress) -> Result<PointCloud, Error> {
+        progress.tick(0.8)?;
         let world = |place: &Place| {
             let corner = |corner: usize| DVec3::from(cloud.positions()[corner].map(f64::from));
             Triangle(self.corners(place).map(corner)).at(place.second, place.third).as_vec3().to_array()
@@ -42,7 +45,7 @@ impl SurfaceSamples {
             sampled.colors = Some(self.places.par_iter().map(mixed).collect());
         }
         for field in cloud.fields() {
-            progress::tick(progress, 0.9)?;
+            progress.tick(0.9)?;
             sampled.fields.push(Field { name: field.name.clone(), values: self.field(&field.values) });
         }
         normalize_normals(&mut sampled);

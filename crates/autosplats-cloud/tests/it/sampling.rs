@@ -1,8 +1,7 @@
 //! Tests of sampling on surfaces: number, position and evenness of points.
 
-use crate::common::Random;
 use autosplats_cloud::{
-    Axes, Contents, Crs, Error, FieldValues, PointCloud, Progress, Unit,
+    Axes, Contents, Crs, Error, FieldValues, PointCloud, Progress, Random, Unit,
     glam::{DVec3, Vec3},
     sample_surface,
 };
@@ -30,10 +29,10 @@ fn grid(size: u32) -> Contents {
             [[a, b, c], [c, d, a]]
         })
         .collect();
-    let mut random = Random(8);
+    let mut random = Random::from_state(8);
     for i in (1..triangles.len()).rev() {
-        triangles.swap(i, random.below(i + 1));
-        triangles[i].rotate_left(random.below(3));
+        triangles.swap(i, random.modulo(i + 1));
+        triangles[i].rotate_left(random.modulo(3));
     }
     mesh((0..(size + 1) * (size + 1)).map(at).collect(), triangles)
 }
@@ -58,7 +57,7 @@ fn sphere(levels: usize) -> Contents {
 
 /// Triangles of all sizes and shapes, anywhere.
 fn soup(count: u32) -> Contents {
-    let mut random = Random(6);
+    let mut random = Random::from_state(6);
     let mut positions = Vec::new();
     for _ in 0..count {
         let size = 10_f64.powf(-2.0 * random.unit());
@@ -155,7 +154,7 @@ fn large_regions_of_small_triangles_get_their_share() {
 
 #[test]
 fn points_keep_more_distance_than_random_ones() {
-    let mut random = Random(9);
+    let mut random = Random::from_state(9);
     let scatter = (0..4000).map(|_| [random.unit() as f32, random.unit() as f32, 0.0]).collect();
     let scatter = spacings(&PointCloud::new(DVec3::ZERO, scatter), 1.0);
     assert!((mean(&scatter) - 1.0).abs() < 0.05, "the measure: {}", mean(&scatter));

@@ -1,7 +1,7 @@
 //! Tests of thinning and shuffling.
 
-use crate::common::{Random, positions, rich_cloud};
-use autosplats_cloud::{FieldValues, PointCloud, Scan, glam::DMat4, glam::DVec3};
+use crate::common::{positions, rich_cloud};
+use autosplats_cloud::{FieldValues, PointCloud, Random, Scan, glam::DMat4, glam::DVec3};
 
 #[test]
 fn attributes_and_scans_go_with_their_points() {
@@ -32,12 +32,12 @@ fn scanned(random: &mut Random, count: usize) -> PointCloud {
     let mut scans = Vec::new();
     let mut start = 0;
     while start < count {
-        let end = count.min(start + random.below(count / 2));
+        let end = count.min(start + random.modulo(count / 2));
         let place = DVec3::from([0; 3].map(|_| (10.0 * random.unit()).floor()));
-        if random.below(3) > 0 {
+        if random.modulo(3) > 0 {
             scans.push(Scan { name: None, world_from_sensor: DMat4::from_translation(place), points: start..end });
         }
-        start = end + random.below(5);
+        start = end + random.modulo(5);
     }
     let cloud = PointCloud::new(DVec3::new(4e5, 5e6, 0.0), positions(count)).with_scans(scans);
     let number = |sensor: &Option<DVec3>| sensor.map_or(f64::NAN, |at| at.dot(DVec3::new(1.0, 10.0, 100.0)));
@@ -57,22 +57,22 @@ fn keep_their_own(cloud: &PointCloud, moved: impl Fn(DVec3) -> DVec3) -> bool {
 
 #[test]
 fn whatever_is_done_to_points_their_sensors_stay_their_own() {
-    let mut random = Random(17);
+    let mut random = Random::from_state(17);
     let mut operations = [0; 6];
     for round in 0..200 {
-        let count = 20 + random.below(100);
+        let count = 20 + random.modulo(100);
         let mut cloud = scanned(&mut random, count);
         let mut shift = DVec3::ZERO;
         for _ in 0..4 {
-            let operation = random.below(operations.len());
+            let operation = random.modulo(operations.len());
             operations[operation] += 1;
             match operation {
                 0 => {
-                    let step = 1 + random.below(3);
+                    let step = 1 + random.modulo(3);
                     cloud.keep_every(step);
                 }
                 1 => {
-                    let kept: Vec<bool> = (0..cloud.len()).map(|_| random.below(4) > 0).collect();
+                    let kept: Vec<bool> = (0..cloud.len()).map(|_| random.modulo(4) > 0).collect();
                     cloud.retain(|i| kept[i]);
                 }
                 2 => cloud.thin_by_voxel(0.3 + random.unit(), &()).unwrap(),

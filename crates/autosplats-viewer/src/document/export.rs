@@ -5,7 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_memory, check_writable, glam::DMat4, write};
+use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_memory, glam::DMat4};
+use autosplats_formats::{check_writable, write};
 
 use super::{Document, Layer, LayerId, shown::points_where};
 

@@ -27,7 +27,7 @@ pub(crate) struct Layer {
     pub(crate) name: String,
     /// The file that the points were read from.
     pub(crate) path: Option<PathBuf>,
-    /// The points as read, with [all digits](autosplats::cloud::ReadOptions::exact). They never change.
+    /// The points as read, with [all digits](autosplats_formats::ReadOptions::exact). They never change.
     pub(crate) cloud: Arc<PointCloud>,
     pub(crate) visible: bool,
     /// Whether points are still to come or to change. Incomplete points can be seen, but not selected or edited.

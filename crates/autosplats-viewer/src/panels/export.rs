@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use autosplats::cloud::{Progress, written_formats};
+use autosplats::cloud::Progress;
+use autosplats_formats::written_formats;
 use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile, Write};

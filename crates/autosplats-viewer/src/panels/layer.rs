@@ -1,6 +1,6 @@
 //! The menu of an input: its name, its place in the list and in the world.
 
-use autosplats::cloud::Source;
+use autosplats_sources::Source;
 use eframe::egui;
 
 use crate::app::App;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use autosplats::cloud::{PointCloud, Source};
+use autosplats::cloud::PointCloud;
+use autosplats_sources::Source;
 use eframe::egui;
 
 use super::thread::StreamThread;

@@ -10,7 +10,7 @@ mod thread;
 use std::sync::Arc;
 use std::time::Duration;
 
-use autosplats::cloud::{Statistics, Timeline, beginnings};
+use autosplats_sources::{Statistics, Timeline, beginnings};
 
 pub(crate) use self::clock::{Clock, SPEEDS};
 pub(crate) use self::reel::{Reel, Track};

@@ -7,7 +7,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 
-use autosplats::cloud::{Error, Player, PointCloud, Progress, ReadOptions};
+use autosplats::cloud::{Error, PointCloud, Progress};
+use autosplats_formats::ReadOptions;
+use autosplats_sources::Player;
 use eframe::egui;
 
 use crate::document::LayerId;

@@ -3,7 +3,9 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use autosplats::cloud::{Error, PointCloud, Progress, ReadOptions, Statistics, Timeline};
+use autosplats::cloud::{Error, PointCloud, Progress};
+use autosplats_formats::ReadOptions;
+use autosplats_sources::{Statistics, Timeline};
 use eframe::egui;
 
 use crate::glance::{FirstLook, SharedViewFrame};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use autosplats::cloud::Source;
+use autosplats_sources::Source;
 
 use super::*;
 use crate::commands::Command;

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use autosplats::cloud::{PointCloud, Scene};
+use autosplats::cloud::PointCloud;
 use autosplats::{Camera, Projection, Renderer, Settings, Timings};
+use autosplats_scenes::Scene;
 
 /// Size of every picture in pixels, as in the paper.
 pub(crate) const SIZE: [u32; 2] = [1760, 900];

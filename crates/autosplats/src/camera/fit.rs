@@ -136,11 +136,11 @@ impl Camera {
     /// # Examples
     ///
     /// ```
-    /// use autosplats::{
-    ///     Camera, Projection, ViewDirection, cloud::{ReadOptions, Source}, guess_axes,
-    /// };
+    /// use autosplats::{Camera, Projection, ViewDirection, guess_axes};
+    /// use autosplats_scenes::Scene;
     ///
-    /// let cloud = Source::parse("scene:figure:2K")?.read(&ReadOptions::default(), &())?;
+    /// let (scene, count) = Scene::parse("figure:2K")?;
+    /// let cloud = scene.sample(count, &|_| true)?;
     /// let projection = Projection::PerspectiveFovDeg(40.0);
     /// let axes = guess_axes(&cloud);
     /// let camera = Camera::fit(&cloud, axes, ViewDirection::Front, 4.0 / 3.0, projection)?;

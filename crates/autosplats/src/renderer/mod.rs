@@ -112,12 +112,11 @@ pub enum Backend {
 /// # Examples
 ///
 /// ```
-/// use autosplats::{
-///     Camera, Projection, Renderer, Settings, ViewDirection, cloud::{ReadOptions, Source},
-///     guess_axes,
-/// };
+/// use autosplats::{Camera, Projection, Renderer, Settings, ViewDirection, guess_axes};
+/// use autosplats_scenes::Scene;
 ///
-/// let cloud = Source::parse("scene:figure:4K")?.read(&ReadOptions::default(), &())?;
+/// let (scene, count) = Scene::parse("figure:4K")?;
+/// let cloud = scene.sample(count, &|_| true)?;
 /// let (axes, projection) = (guess_axes(&cloud), Projection::PerspectiveFovDeg(40.0));
 /// let camera = Camera::fit(&cloud, axes, ViewDirection::Front, 4.0 / 3.0, projection)?;
 /// let mut renderer = Renderer::new();

@@ -9,11 +9,12 @@ use std::collections::HashMap;
 
 use crate::test_clouds::EYE;
 use autosplats::cloud::glam::{DMat4, DVec3};
-use autosplats::cloud::{FieldValues, PointCloud, Scan, Scene};
+use autosplats::cloud::{FieldValues, PointCloud, Scan};
 use autosplats::{
     Backend, Background, Camera, ColorMode, Counts, Error, GBuffer, Image, Projection, Reconstruction, Renderer,
     SearchEngine, Settings, Shading, wgpu,
 };
+use autosplats_scenes::Scene;
 
 const SIZE: [u32; 2] = [480, 300];
 

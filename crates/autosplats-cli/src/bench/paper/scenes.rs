@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 use autosplats_cloud::glam::{DMat4, DVec3};
-use autosplats_cloud::{Contents, PointCloud, ReadOptions, Scene, read_mesh, read_with, sample_surface};
+use autosplats_cloud::{Contents, PointCloud, sample_surface};
+use autosplats_formats::{ReadOptions, read_mesh, read_with};
+use autosplats_scenes::Scene;
 
 use crate::exit::{Exit, Failure};
 use crate::input::{Inputs, read_failure};

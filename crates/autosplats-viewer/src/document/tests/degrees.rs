@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use autosplats::cloud::{
-    Crs, PointCloud, ReadOptions, Scan, Unit,
+    Crs, PointCloud, Scan, Unit,
     glam::{DMat4, DVec3},
-    read_with,
 };
+use autosplats_formats::{ReadOptions, read, read_with};
 
 use super::super::{Bits, Document, ExportScope, Layer, LayerId, Replace, SelectMode, export};
 use super::{cloud, edit};
@@ -124,7 +124,7 @@ fn beside_metres_all_is_written_in_metres() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("out.ply");
     export(&document, ExportScope::All, &path, Replace::Nothing, &()).expect("written");
-    let written = PointCloud::from_path(&path, &()).expect("read again");
+    let written = read(&path, &()).expect("read again");
     let shown = document.shown();
     for index in 0..30 {
         let off = written.world_position(index) - shown.cloud.world_position(index);

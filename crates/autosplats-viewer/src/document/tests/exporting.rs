@@ -7,10 +7,10 @@ use std::{
 };
 
 use autosplats::cloud::{
-    Error, FieldValues, PointCloud, Progress, ReadOptions, Scan,
+    Error, FieldValues, PointCloud, Progress, Scan,
     glam::{DMat4, DVec3},
-    read_with, write,
 };
+use autosplats_formats::{ReadOptions, read_with, write};
 
 use super::super::{ClipBox, Document, ExportError, ExportScope, Exported, Layer, Replace, export};
 use super::{FAR, cloud, document, edit, every, select_every};

@@ -3,9 +3,10 @@
 use std::{path::PathBuf, sync::Arc};
 
 use autosplats::cloud::{
-    FieldValues, PointCloud, ReadOptions, Scan,
+    FieldValues, PointCloud, Scan,
     glam::{DMat4, DVec3},
 };
+use autosplats_formats::ReadOptions;
 
 use super::super::{Document, Layer};
 use super::{FAR, cloud, document, edit, every};
@@ -86,7 +87,7 @@ fn coordinates_are_told_as_the_file_has_them() {
         let path = folder.path().join(name);
         std::fs::write(&path, content).expect("written");
         let options = ReadOptions { exact: true, ..ReadOptions::default() };
-        let cloud = autosplats::cloud::read_with(&path, &options, &()).expect("read");
+        let cloud = autosplats_formats::read_with(&path, &options, &()).expect("read");
         (0..cloud.len()).map(|point| super::super::pick::file_text(&cloud, point).to_vec()).collect::<Vec<_>>()
     };
     let head = |encoding: &str, kind: &str, count: usize| {
@@ -105,7 +106,7 @@ fn coordinates_are_told_as_the_file_has_them() {
     assert_eq!(digits("lost.xyz", lines.as_bytes()), wanted, "with what f32 loses");
     let coarse = PointCloud::new(DVec3::new(512_345.67, 0.0, 0.0), vec![[0.0; 3], [0.01, 0.1, -1.0]]);
     let path = folder.path().join("steps.las");
-    autosplats::cloud::write(&coarse.with_resolution(DVec3::splat(0.01)), &path, &()).expect("written");
+    autosplats_formats::write(&coarse.with_resolution(DVec3::splat(0.01)), &path, &()).expect("written");
     let steps = std::fs::read(&path).expect("read");
     assert_eq!(digits("again.las", &steps)[1], ["512345.68", "0.10", "-1.00"], "steps of a hundredth");
 }

@@ -5,7 +5,8 @@
 
 use std::{path::Path, sync::Arc};
 
-use autosplats::cloud::{PointCloud, ReadOptions, read_with};
+use autosplats::cloud::PointCloud;
+use autosplats_formats::{ReadOptions, read_with};
 
 use super::super::{Document, ExportScope, Layer, Replace, export, pick::file_text};
 use super::{edit, every};

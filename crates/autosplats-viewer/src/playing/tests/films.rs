@@ -1,8 +1,8 @@
 //! Films of playing inputs.
 
-use autosplats::cloud::ReadOptions;
 use autosplats::{Camera, Image, Projection, Renderer};
 use autosplats_film::Target;
+use autosplats_formats::ReadOptions;
 
 use super::*;
 use crate::playing::Reel;

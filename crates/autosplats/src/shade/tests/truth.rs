@@ -2,8 +2,8 @@
 
 use std::array::from_fn;
 
-use autosplats_cloud::Scene as ExactScene;
 use autosplats_cloud::glam::DVec3;
+use autosplats_scenes::Scene as ExactScene;
 use rayon::prelude::*;
 
 use super::super::*;

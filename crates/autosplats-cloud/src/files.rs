@@ -1,0 +1,106 @@
+//! Files as bytes: mapped for reading, and written whole or not at all.
+
+use std::{
+    ffi::OsStr,
+    fs::File,
+    io::{BufWriter, Read as _, Write as _},
+    ops::Deref,
+    path::Path,
+};
+
+/// The content of a file: mapped, or read if the file cannot be mapped, such as a pipe.
+pub enum Bytes {
+    /// A map of the file.
+    Mapped(memmap2::Mmap),
+    /// A copy of the content.
+    Read(Vec<u8>),
+}
+
+impl Bytes {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// Those of the operating system.
+    #[allow(unsafe_code, reason = "a memory map is several times faster than reading, and needs unsafe")]
+    pub fn open(path: &Path) -> std::io::Result<Self> {
+        let mut file = File::open(path)?;
+        let metadata = file.metadata()?;
+        if metadata.is_file() && metadata.len() > 0 {
+            // SAFETY: the map is read-only and private to this call. If another program shortens the file meanwhile,
+            // the system ends the process with a bus error. If another program writes to the file, values are wrong,
+            // but every access is checked against the length at mapping. All programs that map files carry both risks.
+            let map = unsafe { memmap2::Mmap::map(&file) }?;
+            return Ok(Self::Mapped(map));
+        }
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        Ok(Self::Read(bytes))
+    }
+}
+
+impl Deref for Bytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map,
+            Self::Read(bytes) => bytes,
+        }
+    }
+}
+
+/// Size of the output buffer, in bytes.
+const BUFFER: usize = 1 << 20;
+
+/// Writes a file that appears complete or not at all, and replaces an existing one. `write` fills a
+/// [temporary file](temporary_beside), which is then renamed; on failure it is removed. `failed` makes the caller's
+/// error of one of the operating system.
+///
+/// # Errors
+/// Those of `write`, and those of the operating system.
+///
+/// # Examples
+///
+/// ```
+/// use std::io::{Error, Write as _};
+///
+/// use autosplats_cloud::write_whole;
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("notes.txt");
+/// write_whole(&path, |error| error, |file| file.write_all(b"all of it"))?;
+/// let failed = write_whole(&path, |error| error, |file| {
+///     file.write_all(b"half")?;
+///     Err(Error::other("stopped"))
+/// });
+/// assert!(failed.is_err());
+/// assert_eq!(std::fs::read(&path)?, b"all of it");
+/// # Ok::<(), Error>(())
+/// ```
+pub fn write_whole<E>(
+    path: &Path,
+    failed: impl Fn(std::io::Error) -> E,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut file = temporary_beside(path, ".tmp").map_err(&failed)?;
+    let mut writer = BufWriter::with_capacity(BUFFER, file.as_file_mut());
+    write(&mut writer)?;
+    writer.flush().map_err(&failed)?;
+    drop(writer);
+    file.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}
+
+/// A temporary file in the folder of `path`, to be renamed once complete. Its name ends in `suffix`.
+///
+/// # Errors
+/// Those of the operating system.
+pub fn temporary_beside(path: &Path, suffix: impl AsRef<OsStr>) -> std::io::Result<tempfile::NamedTempFile> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".autosplats-").suffix(suffix.as_ref());
+    // Temporary files are private by default; the result shall have usual permissions.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}

@@ -1,0 +1,28 @@
+//! Files of points: reading, describing and writing them in all formats.
+//!
+//! Formats are recognised by content. Nothing that a file claims is trusted before it is checked.
+//!
+//! ```
+//! use autosplats_formats::{read, write};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let path = |name| folder.path().join(name);
+//! std::fs::write(path("survey.csv"), "x,y,z,Intensity\n512000.5,5400000.25,310.0,7\n")?;
+//! let cloud = read(&path("survey.csv"), &())?;
+//! assert_eq!(cloud.world_position(0).y, 5_400_000.25);
+//! write(&cloud, &path("survey.ply"), &())?;
+//! # Ok(())
+//! # }
+//! ```
+
+mod color_scale;
+mod las;
+mod read;
+mod write;
+
+pub use read::{
+    Attribute, DepthCamera, Description, ReadOptions, check_not_lfs_pointer, colors_beside, describe, describe_bytes,
+    formats, framing, gltf_animation, read, read_bytes, read_gltf_at, read_mesh, read_mesh_bytes, read_with, table,
+};
+pub use write::{check_writable, write, written_formats};

@@ -1,0 +1,437 @@
+//! The values of the points, filled from records by threads in parallel.
+//!
+//! # How it works
+//!
+//! All columns are allocated at once, as zeros that the system provides on first touch. A piece is a run of points with
+//! its part of every column. A piece writes a column only if some value is not zero. So a column that stays zero takes
+//! no memory, and is finally left out as not recorded.
+//!
+//! Colours have 16 bits in the file, but many writers store 8-bit values. One byte is kept of each: the low byte until
+//! a value above 255 appears. All values before it are then known to be at most 255, so their high bytes are zero.
+
+use std::{
+    ops::Range,
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, each_type, residual};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{
+    super::Job,
+    dimension::{Dimension, Source, zeroed},
+    extra::Extra,
+    header::{Header, bytes_at},
+};
+use crate::las::{self, ANGLE_STEP, Place};
+
+/// Points decoded between two checks for cancellation, and points of a preview chunk.
+pub(super) const BATCH: usize = 1 << 19;
+
+/// Records that stay in the innermost cache while their values are taken one field after the other.
+const CACHED: usize = 1 << 9;
+
+/// Facts about the values of some points.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ValueFacts {
+    /// Whether any value is not zero, by field.
+    fields: Vec<bool>,
+    residuals: bool,
+    colors: bool,
+    /// Whether 8 bits lose some of a colour.
+    lossy_colors: bool,
+}
+
+impl ValueFacts {
+    pub(super) fn add(&mut self, other: &Self) {
+        self.fields.resize(self.fields.len().max(other.fields.len()), false);
+        for (seen, other) in self.fields.iter_mut().zip(&other.fields) {
+            *seen |= other;
+        }
+        self.residuals |= other.residuals;
+        self.colors |= other.colors;
+        self.lossy_colors |= other.lossy_colors;
+    }
+}
+
+/// The values of all points.
+pub(super) struct Columns<'a> {
+    header: &'a Header,
+    origin: DVec3,
+    /// Byte offset of the colours in a record.
+    colors_at: Option<usize>,
+    dimensions: Vec<Dimension>,
+    positions: Vec<[f32; 3]>,
+    /// Empty unless all digits are wanted.
+    residuals: Vec<[f32; 3]>,
+    colors: Vec<[u8; 3]>,
+    fields: Vec<FieldValues>,
+    /// Whether a colour above 255 has been found.
+    wide_colors: AtomicBool,
+    seen: ValueFacts,
+}
+
+impl<'a> Columns<'a> {
+    /// Makes columns of zeros for `count` points.
+    pub(super) fn new(
+        header: &'a Header,
+        origin: DVec3,
+        exact: bool,
+        mut dimensions: Vec<Dimension>,
+        count: usize,
+    ) -> Result<Self, Error> {
+        let colors_at = las::colors(header.format);
+        if let (Some(at), true) = (colors_at, exact) {
+            let color =
+                |(index, name): (usize, &str)| Dimension { name: name.into(), source: Source::Color(at + 2 * index) };
+            dimensions.extend(["Red", "Green", "Blue"].into_iter().enumerate().map(color));
+        }
+        Ok(Self {
+            header,
+            origin,
+            colors_at,
+            positions: zeroed(count, "positions")?,
+            residuals: zeroed(if exact { count } else { 0 }, "residuals")?,
+            colors: zeroed(if colors_at.is_some() { count } else { 0 }, "colours")?,
+            fields: dimensions.iter().map(|dimension| dimension.zeros(count)).collect::<Result<_, _>>()?,
+            dimensions,
+            wide_colors: AtomicBool::new(false),
+            seen: ValueFacts::default(),
+        })
+    }
+
+    /// Lets `work` fill consecutive runs of points, of the lengths `counts`, from point `start` on in parallel. `work`
+    /// receives the run's index and its part of the columns. Returns the result of each run.
+    pub(super) fn fill(
+        &mut self,
+        start: usize,
+        counts: &[usize],
+        work: impl Fn(usize, &mut Piece<'_>) -> Result<(), String> + Sync + Send,
+    ) -> Vec<Result<(), String>> {
+        let were_wide = *self.wide_colors.get_mut();
+        let mut positions = &mut self.positions[start..];
+        let mut residuals = self.residuals.get_mut(start..).unwrap_or_default();
+        let mut colors = self.colors.get_mut(start..).unwrap_or_default();
+        let mut fields: Vec<Slice<'_>> = self.fields.iter_mut().map(|values| Slice::from(values, start)).collect();
+        let pieces = counts.iter().map(|&count| Piece {
+            header: self.header,
+            origin: self.origin,
+            colors_at: self.colors_at,
+            dimensions: &self.dimensions,
+            wide: &self.wide_colors,
+            positions: split(&mut positions, count),
+            residuals: split(&mut residuals, count),
+            colors: split(&mut colors, count),
+            fields: fields.iter_mut().map(|slice| slice.split(count)).collect(),
+            seen: ValueFacts { fields: vec![false; self.dimensions.len()], ..ValueFacts::default() },
+            narrow: 0,
+            done: 0,
+        });
+        let pieces: Vec<Piece<'_>> = pieces.collect();
+        let outcomes: Vec<_> = pieces
+            .into_par_iter()
+            .enumerate()
+            .map(|(index, mut piece)| {
+                let outcome = work(index, &mut piece);
+                (outcome, piece.seen, piece.narrow)
+            })
+            .collect();
+        let wide = *self.wide_colors.get_mut();
+        if wide && !were_wide && !self.colors.is_empty() {
+            clear(&mut self.colors[..start]);
+        }
+        let mut at = start;
+        let mut errors = Vec::with_capacity(counts.len());
+        for ((outcome, seen, narrow), &count) in outcomes.into_iter().zip(counts) {
+            if wide && narrow > 0 {
+                clear(&mut self.colors[at..at + narrow]);
+            }
+            self.seen.add(&seen);
+            errors.push(outcome);
+            at += count;
+        }
+        errors
+    }
+
+    /// Removes ranges of points, which must be in order. Kept points move down, and no mask is allocated: a small file
+    /// may claim millions of points that cannot be decompressed, whose memory is untouched.
+    pub(super) fn remove(&mut self, ranges: &[Range<usize>]) {
+        remove(&mut self.positions, ranges);
+        remove(&mut self.residuals, ranges);
+        remove(&mut self.colors, ranges);
+        for values in &mut self.fields {
+            each_type!(values, v => remove(v, ranges));
+        }
+    }
+
+    /// A copy of some points, with the fields known so far.
+    pub(super) fn preview(&self, range: Range<usize>) -> Result<PointCloud, Error> {
+        let mut cloud = PointCloud::new(self.origin, self.positions[range.clone()].to_vec()).with_axes(Axes::ZUp);
+        if self.seen.colors {
+            cloud = cloud.with_colors(self.colors[range.clone()].to_vec())?;
+        }
+        for (index, name) in self.names() {
+            let values = match &self.fields[index] {
+                FieldValues::U8(v) => FieldValues::U8(v[range.clone()].to_vec()),
+                FieldValues::U16(v) => FieldValues::U16(v[range.clone()].to_vec()),
+                FieldValues::F64(v) => FieldValues::F64(v[range.clone()].to_vec()),
+                // These types suffice for a preview.
+                _ => continue,
+            };
+            cloud = cloud.with_field(name, values)?;
+        }
+        Ok(cloud)
+    }
+
+    /// Whether a field is kept: it is not all zero, or it is a 16-bit colour of which 8 bits lose some.
+    fn is_recorded(&self, index: usize) -> bool {
+        match self.dimensions[index].source {
+            Source::Color(_) => self.seen.lossy_colors,
+            _ => self.seen.fields.get(index).copied().unwrap_or(false),
+        }
+    }
+
+    /// Indices and unique names of the fields to keep. Extra bytes may repeat a name of the point format.
+    fn names(&self) -> Vec<(usize, String)> {
+        let mut names: Vec<(usize, String)> = Vec::new();
+        for (index, dimension) in self.dimensions.iter().enumerate().filter(|(index, _)| self.is_recorded(*index)) {
+            let mut name = dimension.name.clone();
+            while names.iter().any(|(_, other)| other.eq_ignore_ascii_case(&name)) {
+                name.push('_');
+            }
+            names.push((index, name));
+        }
+        names
+    }
+
+    /// Makes the cloud; a field that is zero at every point was not recorded and is left out. The second result tells
+    /// whether the 16-bit colours hold 8-bit values.
+    pub(super) fn into_cloud(mut self) -> Result<(PointCloud, bool), Error> {
+        let mut names = self.names().into_iter().peekable();
+        let narrow = self.seen.colors && !*self.wide_colors.get_mut();
+        let mut cloud = PointCloud::new(self.origin, self.positions).with_axes(Axes::ZUp);
+        if self.seen.residuals {
+            cloud = cloud.with_residuals(self.residuals)?;
+        }
+        if self.seen.colors {
+            cloud = cloud.with_colors(self.colors)?;
+        }
+        for (index, values) in self.fields.into_iter().enumerate() {
+            if let Some((_, name)) = names.next_if(|(recorded, _)| *recorded == index) {
+                cloud = cloud.with_field(name, values)?;
+            }
+        }
+        Ok((cloud, narrow))
+    }
+}
+
+/// A run of points with its part of every column.
+pub(super) struct Piece<'a> {
+    header: &'a Header,
+    origin: DVec3,
+    colors_at: Option<usize>,
+    dimensions: &'a [Dimension],
+    wide: &'a AtomicBool,
+    positions: &'a mut [[f32; 3]],
+    residuals: &'a mut [[f32; 3]],
+    colors: &'a mut [[u8; 3]],
+    fields: Vec<Slice<'a>>,
+    seen: ValueFacts,
+    /// Number of leading points whose colours were read as 8 bits.
+    narrow: usize,
+    /// Number of points filled.
+    done: usize,
+}
+
+impl Piece<'_> {
+    /// Fills the next points from their records.
+    pub(super) fn take(&mut self, records: &[u8]) {
+        records.chunks(CACHED * self.header.record_len).for_each(|records| self.take_cached(records));
+    }
+
+    fn take_cached(&mut self, records: &[u8]) {
+        let len = self.header.record_len;
+        let range = self.done..self.done + records.len() / len;
+        let (header, origin) = (self.header, self.origin);
+        let records = || records.chunks_exact(len);
+        for (position, record) in self.positions[range.clone()].iter_mut().zip(records()) {
+            *position = (header.world(record) - origin).as_vec3().to_array();
+        }
+        if !self.residuals.is_empty() {
+            let mut any = false;
+            for (lost, record) in self.residuals[range.clone()].iter_mut().zip(records()) {
+                *lost = residual(header.world(record) - origin);
+                any |= *lost != [0.0; 3];
+            }
+            self.seen.residuals |= any;
+        }
+        if let Some(at) = self.colors_at {
+            self.take_colors(range.clone(), at, records());
+        }
+        for ((slice, dimension), seen) in self.fields.iter_mut().zip(self.dimensions).zip(&mut self.seen.fields) {
+            *seen |= slice.take(range.clone(), dimension, records());
+        }
+        self.done = range.end;
+    }
+
+    fn take_colors<'r>(&mut self, range: Range<usize>, at: usize, records: impl Iterator<Item = &'r [u8]> + Clone) {
+        let colors = records.map(|record| [u16_at(record, at), u16_at(record, at + 2), u16_at(record, at + 4)]);
+        let mut bits = 0;
+        let mut lossy = false;
+        for channel in colors.clone().flatten() {
+            bits |= channel;
+            lossy |= channel != (channel >> 8) * 257;
+        }
+        if bits == 0 {
+            return;
+        }
+        self.seen.colors = true;
+        self.seen.lossy_colors |= lossy;
+        if bits > 255 {
+            self.wide.store(true, Ordering::Relaxed);
+        }
+        let wide = self.wide.load(Ordering::Relaxed);
+        if !wide {
+            self.narrow = range.end;
+        }
+        let shift = if wide { 8 } else { 0 };
+        for (color, channels) in self.colors[range].iter_mut().zip(colors) {
+            *color = channels.map(|channel| (channel >> shift) as u8);
+        }
+    }
+}
+
+macro_rules! slices {
+    ($($variant:ident($type:ty)),*) => {
+        /// Values of a field that a piece fills.
+        enum Slice<'a> {
+            $($variant(&'a mut [$type])),*
+        }
+
+        impl<'a> Slice<'a> {
+            fn from(values: &'a mut FieldValues, start: usize) -> Self {
+                match values {
+                    $(FieldValues::$variant(values) => Self::$variant(&mut values[start..])),*
+                }
+            }
+
+            /// Splits off the first values.
+            fn split(&mut self, count: usize) -> Self {
+                match self {
+                    $(Self::$variant(values) => Self::$variant(split(values, count))),*
+                }
+            }
+
+            /// Fills values from an unscaled value in the extra bytes; returns whether any is not zero.
+            fn take_plain<'r>(
+                &mut self,
+                range: Range<usize>,
+                extra: &Extra,
+                records: impl Iterator<Item = &'r [u8]> + Clone,
+            ) -> bool {
+                match self {
+                    $(Self::$variant(values) => {
+                        put(&mut values[range], records, |record| <$type>::from_le_bytes(bytes_at(record, extra.at)))
+                    }),*
+                }
+            }
+        }
+    };
+}
+slices!(U8(u8), I8(i8), U16(u16), I16(i16), U32(u32), I32(i32), U64(u64), I64(i64), F32(f32), F64(f64));
+
+impl Slice<'_> {
+    /// Fills values from some records; returns whether any is not zero.
+    fn take<'r>(
+        &mut self,
+        range: Range<usize>,
+        dimension: &Dimension,
+        records: impl Iterator<Item = &'r [u8]> + Clone,
+    ) -> bool {
+        match (self, &dimension.source) {
+            (Self::U8(v), &Source::Own(Place::Bits { at, shift, mask })) => {
+                put(&mut v[range], records, |record| record[at] >> shift & mask)
+            }
+            (Self::I8(v), &Source::Own(Place::I8(at))) => put(&mut v[range], records, |record| record[at] as i8),
+            (Self::U16(v), &(Source::Own(Place::U16(at)) | Source::Color(at))) => {
+                put(&mut v[range], records, |record| u16_at(record, at))
+            }
+            (Self::F32(v), &Source::Own(Place::Angle(at))) => {
+                put(&mut v[range], records, |record| f32::from(u16_at(record, at) as i16) * ANGLE_STEP)
+            }
+            (Self::F64(v), &Source::Own(Place::F64(at))) => {
+                put(&mut v[range], records, |record| f64::from_le_bytes(bytes_at(record, at)))
+            }
+            (Self::F64(v), Source::Extra(extra @ Extra { scaled: Some((scale, offset)), .. })) => {
+                put(&mut v[range], records, |record| match extra.number(record) {
+                    Some(number) => number * scale + offset,
+                    None => f64::NAN,
+                })
+            }
+            // Floats have NaN for a missing value; integers keep the file's marker.
+            (Self::F32(v), Source::Extra(extra)) if extra.no_data.is_some() => {
+                put(&mut v[range], records, |record| extra.number(record).map_or(f32::NAN, |number| number as f32))
+            }
+            (Self::F64(v), Source::Extra(extra)) if extra.no_data.is_some() => {
+                put(&mut v[range], records, |record| extra.number(record).unwrap_or(f64::NAN))
+            }
+            (slice, Source::Extra(extra)) => slice.take_plain(range, extra, records),
+            (_, Source::Own(_) | Source::Color(_)) => false,
+        }
+    }
+}
+
+/// Stores values unless all are zero; returns whether any is not zero.
+fn put<'r, T: Copy + Default + PartialEq>(
+    values: &mut [T],
+    records: impl Iterator<Item = &'r [u8]> + Clone,
+    value: impl Fn(&[u8]) -> T,
+) -> bool {
+    let zero = T::default();
+    if records.clone().all(|record| value(record) == zero) {
+        return false;
+    }
+    for (place, record) in values.iter_mut().zip(records) {
+        *place = value(record);
+    }
+    true
+}
+
+/// Splits off the first elements.
+fn split<'a, T>(slice: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let whole = std::mem::take(slice);
+    let (first, rest) = whole.split_at_mut(count.min(whole.len()));
+    *slice = rest;
+    first
+}
+
+/// Removes ranges of elements, which must be in order.
+fn remove<T: Copy>(values: &mut Vec<T>, ranges: &[Range<usize>]) {
+    if values.is_empty() {
+        return;
+    }
+    let (mut kept, mut at) = (0, 0);
+    for range in ranges.iter().cloned().chain(std::iter::once(values.len()..values.len())) {
+        values.copy_within(at..range.start, kept);
+        kept += range.start - at;
+        at = range.end;
+    }
+    values.truncate(kept);
+    values.shrink_to_fit();
+}
+
+/// Makes colours black. Black ones are not written to: points that failed to decompress keep their memory untouched.
+fn clear(colors: &mut [[u8; 3]]) {
+    colors.iter_mut().filter(|color| **color != [0; 3]).for_each(|color| *color = [0; 3]);
+}
+
+#[inline]
+fn u16_at(record: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes(bytes_at(record, at))
+}
+
+/// Passes newly filled points to the caller as a preview chunk.
+pub(super) fn preview(job: &Job<'_>, columns: &Columns<'_>, start: usize, count: usize) -> Result<(), Error> {
+    job.preview(|| columns.preview(start..start + count))
+}

@@ -1,0 +1,141 @@
+//! Describes a file by its header and variable length records.
+
+use autosplats_cloud::Error;
+
+use super::super::{Attribute, Description, Job};
+use super::{
+    coordinates,
+    dimension::{Source, dimensions},
+    header::{Header, bytes_at},
+    laz,
+    records::Records,
+};
+use crate::las;
+
+/// Bytes of the COPC info record.
+const COPC_INFO: usize = 160;
+
+pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
+    let header = Header::read(job)?;
+    let records = Records::read(job.bytes, &header);
+    let (dimensions, mut notes) = dimensions(&header, &records);
+    notes.extend(records.notes.iter().cloned());
+    let meaning = coordinates::of(&header, &records);
+    notes.extend(meaning.notes);
+    let tree = records.find("copc", 1).filter(|record| record.data.len() == COPC_INFO && header.compressed);
+
+    let coordinate = |(axis, scale): (&str, f64)| Attribute::new(axis, format!("int32 × {scale}"));
+    let mut attributes: Vec<Attribute> =
+        ["X", "Y", "Z"].into_iter().zip(header.scale.to_array()).map(coordinate).collect();
+    let colors = ["Red", "Green", "Blue"].map(|name| Attribute::new(name, "uint16"));
+    let mut colors = las::colors(header.format).map(|_| colors).into_iter().flatten().peekable();
+    for dimension in &dimensions {
+        let stored = match &dimension.source {
+            Source::Own(place) => place.stored(),
+            Source::Color(_) => "uint16".into(),
+            Source::Extra(extra) => extra.stored(),
+        };
+        // Colours are listed after the time and before the other values.
+        if dimension.name == "Infrared" || matches!(dimension.source, Source::Extra(_)) {
+            attributes.extend(colors.by_ref());
+        }
+        attributes.push(Attribute::new(&dimension.name, stored));
+    }
+    attributes.extend(colors);
+
+    let [low, high] = header.bounds;
+    let bounds =
+        (low.is_finite() && high.is_finite() && low.cmple(high).all() && header.points > 0).then_some([low, high]);
+    if header.points > 0 && header.sane_bounds().is_none() {
+        notes.push(format!("the bounds in the header, {low} to {high}, cannot be those of the points"));
+    }
+    notes.extend(missing(job, &header, &records));
+
+    let mut details = details(&header, &records);
+    if let Some(tree) = tree {
+        details.extend(tree_details(tree.data));
+    }
+    let version = header.version_name();
+    let format = match (tree, header.compressed) {
+        (Some(_), _) => format!("COPC 1.0 ({version} point format {})", header.format),
+        (None, true) => format!("{version}, point format {}, compressed (LAZ)", header.format),
+        (None, false) => format!("{version}, point format {}", header.format),
+    };
+    Ok(Description {
+        format,
+        points: Some(header.points),
+        bounds,
+        attributes,
+        crs: meaning.crs,
+        resolution: Some(header.scale.abs()),
+        details,
+        notes,
+        ..Description::default()
+    })
+}
+
+/// What is missing of the points that the header claims, as far as that shows without decoding.
+fn missing(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Option<String> {
+    if header.compressed {
+        return laz::Compressed::open(job, header, records).err().map(|error| match error {
+            Error::Malformed { place, what, .. } => format!("{place}: {what}"),
+            error => error.to_string(),
+        });
+    }
+    let held = ((job.bytes.len() - header.point_data) / header.record_len) as u64;
+    (held < header.points).then(|| format!("the file is cut off: it holds {held} of {} points", header.points))
+}
+
+fn details(header: &Header, records: &Records<'_>) -> Vec<(String, String)> {
+    let mut details = Vec::new();
+    let mut detail = |name: &str, value: String| {
+        if !value.is_empty() {
+            details.push((name.to_owned(), value));
+        }
+    };
+    detail("generating software", header.software.clone());
+    detail("system identifier", header.system.clone());
+    detail("created", date(header.created));
+    let flags = ["GPS time is standard time", "waveforms inside", "waveforms outside", "returns are synthetic", "WKT"];
+    let set = flags.into_iter().enumerate().filter(|(bit, _)| header.global_encoding >> bit & 1 == 1);
+    detail("global encoding", set.map(|(_, flag)| flag).collect::<Vec<_>>().join(", "));
+    // Some files store -0.
+    detail("offset of coordinates", header.offset.to_array().map(|value| (value + 0.0).to_string()).join(", "));
+    detail("variable length records", records.all.len().to_string());
+    let returns = &header.points_by_return;
+    let last = returns.iter().rposition(|&count| count > 0).map_or(0, |index| index + 1);
+    detail("points by return", returns[..last].iter().map(u64::to_string).collect::<Vec<_>>().join(" "));
+    details
+}
+
+/// A day of the year and a year as a date; empty if invalid.
+fn date((day, year): (u16, u16)) -> String {
+    let leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
+    let lengths = [31, if leap { 29 } else { 28 }, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
+    let mut left = day;
+    for (month, length) in lengths.into_iter().enumerate() {
+        if (1..=length).contains(&left) && year > 1 {
+            return format!("{year:04}-{:02}-{left:02}", month + 1);
+        }
+        left = left.saturating_sub(length);
+    }
+    String::new()
+}
+
+/// Shortens decimal text: removes zeros at the end.
+fn short(digits: &str) -> String {
+    digits.parse::<f64>().map_or_else(|_| digits.to_owned(), |value| value.to_string())
+}
+
+/// Facts about the octree of a COPC file.
+fn tree_details(info: &[u8]) -> Vec<(String, String)> {
+    let double = |index: usize| f64::from_le_bytes(bytes_at(info, 8 * index));
+    let center = [0, 1, 2].map(|axis| short(&format!("{:.3}", double(axis)))).join(", ");
+    let six = |value: f64| short(&format!("{value:.5e}"));
+    let times = format!("{} to {}", double(7), double(8));
+    vec![
+        ("COPC root cube".into(), format!("{} wide about {center}", six(2.0 * double(3)))),
+        ("COPC spacing".into(), format!("{} at the root", six(double(4)))),
+        ("COPC times".into(), times),
+    ]
+}

@@ -1,0 +1,146 @@
+//! LAS 1.0 to 1.4, all point formats, also compressed as LAZ or COPC.
+//!
+//! # How it works
+//!
+//! The [`header`] states where the points are and how long their records. The variable length [`records`] describe the
+//! [extra bytes](extra) and the coordinate system. Points are decoded in parallel runs straight into their [`columns`].
+//! Runs of [`laz`] are chunks, decompressed piece by piece; values are taken while a piece is in the cache.
+//!
+//! The origin of the positions is chosen in advance. It is the middle of the claimed bounds if a sample of the points
+//! agrees, otherwise the middle of the sample.
+
+mod columns;
+mod coordinates;
+mod describe;
+mod dimension;
+mod extra;
+mod gps_time;
+mod header;
+mod laz;
+mod point14;
+mod records;
+
+use autosplats_cloud::{Contents, Error, sampled_middle};
+use glam::DVec3;
+
+use self::{
+    columns::{BATCH, Columns, preview},
+    dimension::{Dimension, dimensions},
+    header::Header,
+    laz::Compressed,
+    records::Records,
+};
+use super::{Format, Job};
+use crate::las;
+
+/// Uncompressed points that one thread decodes at a time.
+const RUN: usize = 1 << 13;
+
+/// Largest edge of a box of points for which one origin suits `f32`.
+const MAX_ORIGIN_BOX: f64 = 1e6;
+
+pub(super) const FORMAT: Format = Format {
+    name: "LAS",
+    extensions: &["las", "laz", "copc"],
+    recognised: |bytes| bytes.starts_with(b"LASF"),
+    sensor_frame: false,
+    describe: describe::describe,
+    read,
+};
+
+fn read(job: &Job<'_>) -> Result<Contents, Error> {
+    let header = Header::read(job)?;
+    let records = Records::read(job.bytes, &header);
+    let (dimensions, mut notes) = dimensions(&header, &records);
+    notes.extend(records.notes.iter().cloned());
+    let compressed = if header.compressed { Compressed::open(job, &header, &records)? } else { None };
+    let (points, lost) = match &compressed {
+        Some(compressed) => (compressed.points, compressed.missing),
+        None => complete(job, &header)?,
+    };
+    let exact = job.options.exact;
+    let colors = las::colors(header.format).map_or(0, |_| if exact { 9 } else { 3 });
+    let fields: usize = dimensions.iter().map(Dimension::size).sum();
+    job.check_memory(points, if exact { 24 } else { 12 } + colors + fields)?;
+
+    let records_at = |i: usize| &job.bytes[header.point_data + i * header.record_len..];
+    let origin = match &compressed {
+        Some(compressed) => {
+            let first = compressed.first_records();
+            origin(&header, first.len(), |i| header.world(first[i]))
+        }
+        None => origin(&header, points, |i| header.world(records_at(i))),
+    };
+    let mut columns = Columns::new(&header, origin, exact, dimensions, points)?;
+    let damaged = match &compressed {
+        Some(compressed) => compressed.fill(job, &mut columns)?,
+        None => {
+            uncompressed(job, &header, &mut columns, points)?;
+            Vec::new()
+        }
+    };
+
+    columns.remove(&damaged);
+    let (cloud, narrow) = columns.into_cloud()?;
+    if narrow {
+        notes.push("no colour value exceeds 255; the 16-bit colours are read as 8 bits".into());
+    }
+    let claimed = header.points;
+    if lost > 0 {
+        notes.push(format!("the file is cut off: {lost} of {claimed} points are lost; copy it again"));
+    }
+    if !damaged.is_empty() {
+        let damaged_points: usize = damaged.iter().map(ExactSizeIterator::len).sum();
+        notes.push(format!(
+            "compressed data are damaged: {damaged_points} of {claimed} points are lost; copy the file again"
+        ));
+    }
+    let meaning = coordinates::of(&header, &records);
+    notes.extend(meaning.notes);
+    notes.iter().for_each(|note| job.note(note));
+    Ok(cloud.with_crs(meaning.crs).with_resolution(header.scale.abs()).into())
+}
+
+/// The number of complete records, and the number of missing ones.
+fn complete(job: &Job<'_>, header: &Header) -> Result<(usize, u64), Error> {
+    let held = (job.bytes.len() - header.point_data) / header.record_len;
+    let points = usize::try_from(header.points).map_or(held, |points| points.min(held));
+    if points == 0 && header.points > 0 {
+        let what = format!("the file ends before the first of {} points; it is cut off, copy it again", header.points);
+        return Err(job.malformed(format!("byte {}", job.bytes.len()), what));
+    }
+    Ok((points, header.points - points as u64))
+}
+
+/// The origin of the positions; `sample` gives the coordinates of some points.
+fn origin(header: &Header, count: usize, sample: impl Fn(usize) -> DVec3) -> DVec3 {
+    let middle = sampled_middle(count, sample);
+    match header.sane_bounds() {
+        Some([low, high])
+            if (high - low).max_element() < MAX_ORIGIN_BOX
+                // The middle of the sample is rounded.
+                && middle.cmpge(low - 1.0).all()
+                && middle.cmple(high + 1.0).all() =>
+        {
+            ((low + high) / 2.0).round()
+        }
+        _ => middle,
+    }
+}
+
+fn uncompressed(job: &Job<'_>, header: &Header, columns: &mut Columns<'_>, points: usize) -> Result<(), Error> {
+    let len = header.record_len;
+    let records = &job.bytes[header.point_data..header.point_data + points * len];
+    for start in (0..points).step_by(BATCH) {
+        job.tick(start as f32 / points as f32)?;
+        let batch = &records[start * len..(start + BATCH).min(points) * len];
+        let runs: Vec<&[u8]> = batch.chunks(RUN * len).collect();
+        let counts: Vec<usize> = runs.iter().map(|run| run.len() / len).collect();
+        columns.fill(start, &counts, |index, piece| {
+            piece.take(runs[index]);
+            Ok(())
+        });
+        preview(job, columns, start, batch.len() / len)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,48 @@
+//! Readers of point cloud files, one module per format.
+//!
+//! # How it works
+//!
+//! A file is mapped into memory. Its format is recognised by its first bytes, then by its extension. Most formats end
+//! in the same shape, a [`table`]: named columns of numbers at fixed strides. Positions, colours and fields are taken
+//! from the table in parallel. Binary PLY and PCD already are such a table in the file; their text and lists are packed
+//! into a table first. Bare text, whose files can be the largest, is parsed straight into the columns of a cloud. LAS
+//! has columns of bits and integer coordinates and makes its cloud itself.
+//!
+//! A file is not trusted: the claims of its header are checked against its size before anything is allocated.
+
+mod body;
+mod columns;
+mod depth_image;
+mod describe;
+mod e57;
+pub mod framing;
+mod gltf;
+mod job;
+mod las;
+mod lines;
+mod mesh;
+mod obj;
+mod off;
+mod options;
+mod pcd;
+mod placed;
+mod ply;
+mod ptx;
+mod raw;
+mod registry;
+mod sensor;
+mod stl;
+pub mod table;
+mod text;
+mod xyz;
+
+use self::job::{Format, Job, MAX_HEADER_LINE};
+pub use self::{
+    depth_image::color::beside as colors_beside,
+    describe::{Attribute, Description},
+    options::{DepthCamera, ReadOptions},
+    registry::{
+        check_not_lfs_pointer, describe, describe_bytes, formats, gltf_animation, read, read_bytes, read_gltf_at,
+        read_mesh, read_mesh_bytes, read_with,
+    },
+};

@@ -1,0 +1,258 @@
+//! All formats, and reading a file in whichever it has.
+
+use std::path::Path;
+
+use autosplats_cloud::{Bytes, Contents, Error, PointCloud, Progress};
+
+use super::{
+    depth_image,
+    describe::Description,
+    e57, gltf,
+    job::{Format, Job},
+    las, obj, off,
+    options::ReadOptions,
+    pcd, ply, ptx, raw, sensor, stl, xyz,
+};
+
+/// All formats, in order of precedence: by content first, then by extension. Longer extensions precede shorter ones.
+const FORMATS: &[&Format] = &[
+    &las::FORMAT,
+    &ply::FORMAT,
+    &pcd::FORMAT,
+    &e57::FORMAT,
+    &gltf::FORMAT,
+    &off::FORMAT,
+    &obj::FORMAT,
+    &depth_image::FORMAT,
+    &raw::FORMAT,
+    &ptx::FORMAT,
+    &xyz::FORMAT,
+    // STL is recognised only by a number that fits the file's size, so it comes last.
+    &stl::FORMAT,
+];
+
+/// Formats of meshes, in which a point at (0, 0, 0) is an ordinary point.
+const MODELS: &[&Format] = &[&gltf::FORMAT, &off::FORMAT, &obj::FORMAT, &stl::FORMAT];
+
+/// Names and extensions of the formats that [`read`] understands.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_formats::formats;
+///
+/// assert!(formats().any(|(_, extensions)| extensions.contains(&"e57")));
+/// ```
+pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
+    FORMATS.iter().map(|format| (format.name, format.extensions))
+}
+
+/// Names of all formats, for a message.
+fn format_names() -> String {
+    FORMATS.iter().map(|format| format.name).collect::<Vec<_>>().join(", ")
+}
+
+/// Reads a point cloud in any of the [`formats`], recognised by content first, then by extension.
+///
+/// Coordinates from about 1e4 on are stored relative to an origin of whole numbers, so that survey coordinates keep
+/// their precision. Smaller coordinates keep the file's `f32` values exactly. Non-finite points stay in the cloud.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read; [`Error::UnknownFormat`], [`Error::Malformed`] and [`Error::Unsupported`]
+/// for its content; [`Error::OutOfMemory`]; and [`Error::Cancelled`] if `progress` says so.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::glam::DVec3;
+/// use autosplats_formats::read;
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("scan.xyz");
+/// std::fs::write(&path, "1 2 3\n4 5 6\n")?;
+/// let cloud = read(&path, &())?;
+/// assert_eq!(cloud.world_position(1), DVec3::new(4.0, 5.0, 6.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read(path: &Path, progress: &dyn Progress) -> Result<PointCloud, Error> {
+    read_with(path, &ReadOptions::default(), progress)
+}
+
+/// Like [`read`], with options.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
+    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    read_bytes(path, &bytes, options, progress)
+}
+
+/// Like [`read_with`], from the bytes of a file. `name` helps to recognise the format and appears in messages.
+///
+/// # Errors
+/// Those of [`read`].
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_formats::{ReadOptions, read_bytes};
+///
+/// let text = b"x,y,z,Intensity\n512000.5,5400000.25,310.0,7\n";
+/// let cloud = read_bytes("survey.csv".as_ref(), text, &ReadOptions::default(), &())?;
+/// assert_eq!(cloud.world_position(0).y, 5_400_000.25);
+/// assert_eq!(cloud.fields()[0].name, "Intensity");
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
+pub fn read_bytes(
+    name: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<PointCloud, Error> {
+    Ok(contents(&Job { path: name, progress, bytes, options, triangles: false })?.cloud)
+}
+
+/// Reads points and the triangles between them.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_mesh(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<Contents, Error> {
+    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    read_mesh_bytes(path, &bytes, options, progress)
+}
+
+/// Like [`read_mesh`], from the bytes of a file. `name` helps to recognise the format and appears in messages.
+///
+/// # Errors
+/// Those of [`read`].
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_formats::{ReadOptions, read_mesh_bytes};
+///
+/// let text = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+/// let mesh = read_mesh_bytes("square.obj".as_ref(), text, &ReadOptions::default(), &())?;
+/// assert_eq!(mesh.cloud.len(), 4);
+/// assert_eq!(mesh.triangles.len(), 2);
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
+pub fn read_mesh_bytes(
+    name: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<Contents, Error> {
+    contents(&Job { path: name, progress, bytes, options, triangles: true })
+}
+
+/// Duration of the first animation of a glTF in seconds, and the number of animations, if there are any.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn gltf_animation(name: &Path, bytes: &[u8]) -> Result<Option<(f64, usize)>, Error> {
+    let options = ReadOptions::default();
+    gltf::animation(&Job { path: name, progress: &(), bytes, options: &options, triangles: false })
+}
+
+/// The mesh of a glTF at a time of its first animation.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_gltf_at(name: &Path, bytes: &[u8], seconds: f64, progress: &dyn Progress) -> Result<Contents, Error> {
+    let options = ReadOptions::default();
+    gltf::read_at(&Job { path: name, progress, bytes, options: &options, triangles: true }, Some(seconds))
+}
+
+/// Reads the header of a file, in milliseconds whatever the file's size. Of formats without a header that states counts
+/// only the beginning is read.
+///
+/// # Errors
+/// Those of [`read`], as far as the header shows them.
+pub fn describe(path: &Path, options: &ReadOptions) -> Result<Description, Error> {
+    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    describe_bytes(path, &bytes, options)
+}
+
+/// Like [`describe`], from the bytes of a file.
+///
+/// # Errors
+/// Those of [`describe`].
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_formats::{ReadOptions, describe_bytes};
+///
+/// let text = b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n\
+///     property float y\nproperty float z\nend_header\n0 0 1\n1 0 1\n";
+/// let facts = describe_bytes("scan.ply".as_ref(), text, &ReadOptions::default())?;
+/// assert_eq!(facts.points, Some(2));
+/// assert_eq!(facts.attributes[2].name, "z");
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
+pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Description, Error> {
+    let job = Job { path: name, progress: &(), bytes, options, triangles: false };
+    (format(&job)?.describe)(&job)
+}
+
+/// Fails if the bytes of a file are a Git LFS pointer instead of the data.
+///
+/// # Errors
+/// [`Error::Malformed`].
+pub fn check_not_lfs_pointer(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    if bytes.starts_with(b"version https://git-lfs") {
+        let what = "this is a Git LFS pointer instead of the file; 'git lfs pull' fetches the file";
+        return Err(Error::malformed(path, "line 1", what));
+    }
+    Ok(())
+}
+
+fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
+    check_not_lfs_pointer(job.path, job.bytes)?;
+    let name = job.path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
+    let by_content = FORMATS.iter().find(|format| (format.recognised)(job.bytes));
+    let by_name = || FORMATS.iter().find(|format| format.extensions.iter().any(ends));
+    // Rows of numbers can stand in files of any name, so they are looked for last.
+    let rows = || xyz::looks_like_rows(job.bytes).then_some(&&xyz::FORMAT);
+    by_content
+        .or_else(by_name)
+        .or_else(rows)
+        .copied()
+        .ok_or_else(|| Error::UnknownFormat { path: job.path.into(), known: format_names() })
+}
+
+fn contents(job: &Job<'_>) -> Result<Contents, Error> {
+    job.tick(0.0)?;
+    let format = format(job)?;
+    if job.options.columns.is_some() && !takes_columns(job, format) {
+        job.note(format!("--columns is for text and headerless records; {} names its own columns", format.name));
+    }
+    let mut contents = (format.read)(job)?;
+    let model = MODELS.iter().any(|model| model.name == format.name) || ply::is_mesh(job);
+    // Dropping points would remove corners of a mesh.
+    if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {
+        drop_no_returns(job, format, &mut contents.cloud);
+    }
+    sensor::drop_far(job, &mut contents.cloud);
+    job.tick(1.0)?;
+    Ok(contents)
+}
+
+/// Whether the caller may name the columns of this file.
+fn takes_columns(job: &Job<'_>, format: &Format) -> bool {
+    [xyz::FORMAT.name, raw::FORMAT.name].contains(&format.name)
+        || format.name == pcd::FORMAT.name && pcd::without_header(job)
+}
+
+/// Drops points at (0, 0, 0), which scanners write for missing returns. A single such point may be real, unless
+/// coordinates are in the sensor's frame.
+fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
+    let total = cloud.len();
+    let least = if format.sensor_frame { 1 } else { 2 };
+    let count = cloud.drop_no_returns(|count| (least..total).contains(&count));
+    if count > 0 {
+        job.note(format!("dropped {count} of {total} points at (0, 0, 0), where nothing was measured"));
+    }
+}

@@ -1,0 +1,246 @@
+//! Rows of numbers in text to packed records, in parallel.
+//!
+//! The text is cut into pieces at line ends, and the pieces are parsed in parallel. Each row becomes one record of
+//! little-endian numbers for a [`Table`](super::table::Table).
+
+use autosplats_cloud::{Error, excerpt};
+use rayon::prelude::*;
+
+use super::{
+    Job,
+    table::{CHUNK, ProgressRange, Scalar, reserve},
+};
+
+/// Bytes of text that one thread parses at a time.
+const PIECE: usize = 1 << 19;
+
+/// Storage type of coordinates in text. All digits are read, even if the declared type holds fewer.
+pub(super) const TEXT: &str = "text";
+
+/// Whether a value is a coordinate, which keeps all its digits.
+pub(super) fn is_coordinate(name: &str) -> bool {
+    ["x", "y", "z"].contains(&&*name.to_ascii_lowercase())
+}
+
+/// What to do with the next value of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Token {
+    /// Store the value in the record.
+    Store(Scalar),
+    /// Store a colour packed into 32 bits, written as an integer or as the float of the same bits.
+    Packed,
+    /// Skip the value.
+    Skip,
+    /// Read a count and skip that many values.
+    SkipList,
+}
+
+impl Token {
+    /// Bytes of the value in the record.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::Store(scalar) => scalar.size(),
+            Self::Packed => 4,
+            Self::Skip | Self::SkipList => 0,
+        }
+    }
+}
+
+/// Layout of the rows of a text.
+pub(super) struct Rows<'a> {
+    pub(super) tokens: &'a [Token],
+    /// Number of rows to read; `None` reads to the end of the file.
+    pub(super) count: Option<usize>,
+    /// Whether lines of a single integer are counts, not rows.
+    pub(super) counts_between: bool,
+}
+
+/// Result of parsing one piece of text.
+struct Piece {
+    records: Vec<u8>,
+    rows: usize,
+    error: Option<(usize, String)>,
+}
+
+impl Rows<'_> {
+    /// Parses rows from byte `start` on. Returns the records and their number.
+    pub(super) fn parse(&self, job: &Job<'_>, start: usize, part: ProgressRange) -> Result<(Vec<u8>, usize), Error> {
+        self.parse_and_show(job, start, part, |_, _| Ok(()))
+    }
+
+    /// Like [`parse`](Self::parse), and passes the records and their number to `show`, about a million at a time,
+    /// before the next ones are parsed.
+    pub(super) fn parse_and_show(
+        &self,
+        job: &Job<'_>,
+        start: usize,
+        part: ProgressRange,
+        show: impl Fn(&[u8], usize) -> Result<(), Error>,
+    ) -> Result<(Vec<u8>, usize), Error> {
+        let len = self.record_len();
+        let text = job.bytes;
+        let wanted = self.count.unwrap_or(usize::MAX);
+        let mut records = Vec::new();
+        let (mut rows, mut shown) = (0, 0);
+        let mut at = start;
+        while at < text.len() && rows < wanted {
+            job.tick(part.start + part.len * (at - start) as f32 / (text.len() - start) as f32)?;
+            let mut cuts = vec![at];
+            while at < text.len() && cuts.len() <= 4 * rayon::current_num_threads() {
+                at = after_line_end(text, at.saturating_add(PIECE).min(text.len()));
+                cuts.push(at);
+            }
+            let pieces: Vec<Piece> =
+                cuts.par_windows(2).map(|cut| self.parse_piece(&text[cut[0]..cut[1]], cut[0])).collect();
+            for piece in pieces {
+                let take = piece.rows.min(wanted - rows);
+                let bytes = take * len;
+                reserve(&mut records, bytes, "the points of a text file")?;
+                records.extend_from_slice(&piece.records[..bytes]);
+                rows += take;
+                if rows == wanted {
+                    break;
+                }
+                if let Some((offset, what)) = piece.error {
+                    return Err(job.malformed(job.line(offset), what));
+                }
+            }
+            if rows - shown >= CHUNK {
+                show(&records[shown * len..], rows - shown)?;
+                shown = rows;
+            }
+        }
+        if self.count.is_some() && rows < wanted {
+            return Err(job.malformed(
+                job.line(text.len()),
+                format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
+            ));
+        }
+        show(&records[shown * len..], rows - shown)?;
+        Ok((records, rows))
+    }
+
+    fn record_len(&self) -> usize {
+        self.tokens.iter().map(|token| token.size()).sum()
+    }
+
+    fn parse_piece(&self, text: &[u8], start: usize) -> Piece {
+        let mut piece = Piece { records: Vec::new(), rows: 0, error: None };
+        let mut at = 0;
+        while at < text.len() {
+            let end = line_end(text, at);
+            let line = text[at..end].trim_ascii();
+            if !(is_blank(line) || self.counts_between && is_count(line)) {
+                let len = piece.records.len();
+                if let Err(what) = self.parse_row(line, &mut piece.records) {
+                    piece.records.truncate(len);
+                    piece.error = Some((start + at, what));
+                    break;
+                }
+                piece.rows += 1;
+            }
+            at = end + 1;
+        }
+        piece
+    }
+
+    fn parse_row(&self, line: &[u8], record: &mut Vec<u8>) -> Result<(), String> {
+        let mut values = values(line);
+        for (index, token) in self.tokens.iter().enumerate() {
+            let value = values.next().ok_or_else(|| {
+                format!("{index} values where a point has {}; complete or remove the line", self.tokens.len())
+            })?;
+            match token {
+                Token::Skip => {}
+                Token::SkipList => {
+                    let len = number(value)?;
+                    for index in 0..len as usize {
+                        values.next().ok_or_else(|| format!("a list of {len} values has only {index}"))?;
+                    }
+                }
+                Token::Packed => record.extend(packed(value)?.to_le_bytes()),
+                Token::Store(scalar) => store(*scalar, value, record)?,
+            }
+        }
+        match values.next() {
+            None => Ok(()),
+            Some(value) => {
+                Err(format!("more values than the {} a point has, from '{}' on", self.tokens.len(), excerpt(value)))
+            }
+        }
+    }
+}
+
+#[allow(clippy::cast_lossless, reason = "64-bit integers among the types have no lossless way")]
+fn store(scalar: Scalar, value: &[u8], record: &mut Vec<u8>) -> Result<(), String> {
+    macro_rules! integer {
+        ($type:ty) => {{
+            let number = number(value)?;
+            if number < <$type>::MIN as f64 || number > <$type>::MAX as f64 || number.is_nan() {
+                return Err(format!("{number} does not fit {}", stringify!($type)));
+            }
+            record.extend((number as $type).to_le_bytes());
+        }};
+    }
+    match scalar {
+        Scalar::I8 => integer!(i8),
+        Scalar::U8 => integer!(u8),
+        Scalar::I16 => integer!(i16),
+        Scalar::U16 => integer!(u16),
+        Scalar::I32 => integer!(i32),
+        Scalar::U32 => integer!(u32),
+        Scalar::I64 => integer!(i64),
+        Scalar::U64 => integer!(u64),
+        Scalar::F32 => record.extend((number(value)? as f32).to_le_bytes()),
+        Scalar::F64 => record.extend(number(value)?.to_le_bytes()),
+    }
+    Ok(())
+}
+
+/// Decodes a packed colour: an integer, a float whose bits are the colour, or, in old files, a float whose value is the
+/// colour. Such values are whole numbers, which floats of colour bits never are.
+fn packed(value: &[u8]) -> Result<u32, String> {
+    if let Some(integer) = std::str::from_utf8(value).ok().and_then(|text| text.parse::<i64>().ok()) {
+        return Ok(integer as u32);
+    }
+    let number = number(value)?;
+    let whole = number.fract() == 0.0 && (1.0..16_777_216.0).contains(&number);
+    Ok(if whole { number as u32 } else { (number as f32).to_bits() })
+}
+
+/// A number, including `nan` and `inf` in any letter case.
+pub(super) fn number(value: &[u8]) -> Result<f64, String> {
+    fast_float2::parse(value).or_else(|_| {
+        // Windows writes -nan(ind) and 1.#QNAN.
+        let lower = value.to_ascii_lowercase();
+        if lower.starts_with(b"-nan") || lower.starts_with(b"nan(") || lower.windows(2).any(|pair| pair == b"#q") {
+            return Ok(f64::NAN);
+        }
+        Err(format!("'{}' is not a number", excerpt(value)))
+    })
+}
+
+/// The values of a line, separated by blanks, commas or semicolons.
+pub(super) fn values(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(|byte| matches!(byte, b' ' | b'\t' | b',' | b';' | b'\r')).filter(|value| !value.is_empty())
+}
+
+/// Whether a trimmed line is empty or a comment.
+pub(super) fn is_blank(line: &[u8]) -> bool {
+    line.is_empty() || line.starts_with(b"#") || line.starts_with(b"//")
+}
+
+/// Whether a trimmed line is a single integer, such as the count before the points of a PTS file.
+pub(super) fn is_count(line: &[u8]) -> bool {
+    !line.is_empty() && line.iter().all(u8::is_ascii_digit)
+}
+
+/// The end of the line that contains byte `at`, without its line feed.
+pub(super) fn line_end(text: &[u8], at: usize) -> usize {
+    text[at..].iter().position(|&byte| byte == b'\n').map_or(text.len(), |len| at + len)
+}
+
+/// The start of the line after the one that contains byte `at`.
+pub(super) fn after_line_end(text: &[u8], at: usize) -> usize {
+    (line_end(text, at) + 1).min(text.len())
+}

@@ -1,0 +1,349 @@
+//! Rows of numbers to a cloud, in parallel.
+//!
+//! The text is cut into pieces at line ends. The pieces are parsed in parallel, each into columns of its own, which are
+//! appended to the cloud's columns in order. Besides the cloud, only one batch of pieces is in memory.
+
+use autosplats_cloud::{Error, FieldValues, PointCloud, excerpt, residual, storage_origin};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::super::{Job, table::reserve, text};
+use super::{
+    cells::{Separator, is_missing, trimmed},
+    layout::{Layout, Target},
+};
+use crate::color_scale::ColorScale;
+
+/// Bytes of text that one thread parses at a time.
+const PIECE: usize = 1 << 19;
+
+/// Pieces parsed before their points are added to the cloud.
+const BATCH: usize = 16;
+
+/// Fraction of the work that parsing takes.
+const PARSING: f32 = 0.95;
+
+/// Longest line, in bytes, that the survey of the text reads.
+const MAX_LINE: usize = 1 << 16;
+
+/// Places in the text sampled to find the middle of the points.
+const PLACES: usize = 1024;
+
+/// Reads the rows from byte `start` on.
+pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Option<usize>) -> Result<PointCloud, Error> {
+    let text = job.bytes;
+    let (origin, row_len) = survey(job, layout, start);
+    job.check_memory((text.len() - start) / row_len, layout.bytes_per_point(job.options.exact))?;
+    let parser = Parser { layout, origin, exact: job.options.exact, counts_between: promised.is_some() };
+    let mut all = Columns::new(layout);
+    let mut counts_between = 0_usize;
+    let mut at = start;
+    while at < text.len() {
+        job.tick(PARSING * (at - start) as f32 / (text.len() - start) as f32)?;
+        let mut cuts = vec![at];
+        while at < text.len() && cuts.len() <= BATCH {
+            at = text::after_line_end(text, at.saturating_add(PIECE).min(text.len()));
+            cuts.push(at);
+        }
+        let pieces: Vec<Piece> = cuts.par_windows(2).map(|cut| parser.piece(&text[cut[0]..cut[1]], cut[0])).collect();
+        job.preview(|| {
+            let mut chunk = Columns::new(layout);
+            pieces.iter().try_for_each(|piece| chunk.append(&piece.columns))?;
+            chunk.into_cloud(layout, origin, false)
+        })?;
+        for piece in pieces {
+            if let Some((offset, what)) = piece.error {
+                return Err(job.malformed(job.line(offset), what));
+            }
+            all.append(&piece.columns)?;
+            counts_between = counts_between.saturating_add(piece.counts);
+        }
+    }
+    check_promise(job, all.positions.len(), promised, counts_between)?;
+    job.tick(PARSING)?;
+    all.into_cloud(layout, origin, job.options.exact)
+}
+
+/// Compares the number of rows with the stated counts.
+fn check_promise(job: &Job<'_>, rows: usize, first: Option<usize>, between: usize) -> Result<(), Error> {
+    let Some(first) = first else { return Ok(()) };
+    if rows < first {
+        return Err(job.malformed(
+            job.line(job.bytes.len()),
+            format!("the file ends after {rows} of {first} points; it is cut off, copy it again"),
+        ));
+    }
+    let all = first.saturating_add(between);
+    if rows < all {
+        job.note(format!("the counts of points add up to {all}, but there are {rows}; the file may be cut off"));
+    }
+    Ok(())
+}
+
+/// An origin for the points and the mean length of a row in bytes, from rows sampled all over the text.
+fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
+    let text = job.bytes;
+    let mut points = Vec::new();
+    let (mut last, mut bytes) = (None, 0);
+    for place in 0..PLACES {
+        let offset = start + ((text.len() - start) as u128 * place as u128 / PLACES as u128) as usize;
+        // The search for a line end is bounded, because a line may be as long as the file.
+        let line_end = |at: usize| {
+            let window = &text[at..text.len().min(at + MAX_LINE)];
+            let end = window.iter().position(|&byte| byte == b'\n').map(|len| at + len);
+            end.or((window.len() < MAX_LINE).then_some(text.len()))
+        };
+        let at = if place == 0 { Some(start) } else { line_end(offset).map(|end| (end + 1).min(text.len())) };
+        let Some((at, end)) = at.and_then(|at| Some((at, line_end(at)?))) else { continue };
+        if last == Some(at) {
+            continue;
+        }
+        last = Some(at);
+        let mut point = [f64::NAN; 3];
+        for (cell, target) in layout.dialect.cells(&text[at..end]).zip(&layout.targets) {
+            if let Target::Axis(axis) = *target {
+                point[axis] = layout.dialect.number(cell).unwrap_or(f64::NAN);
+            }
+        }
+        if point.iter().all(|value| value.is_finite()) {
+            bytes += end + 1 - at;
+            points.push(DVec3::from(point));
+        }
+    }
+    let origin = storage_origin(points.len(), |i| points[i]);
+    // The shortest row has three digits, each followed by a byte.
+    (origin, bytes.checked_div(points.len()).unwrap_or(0).max(6))
+}
+
+impl Layout {
+    fn bytes_per_point(&self, exact: bool) -> usize {
+        let fields: usize = self.fields.iter().map(|(_, wide)| if *wide { 8 } else { 4 }).sum();
+        12 + if exact { 12 } else { 0 } + if self.has_color { 3 } else { 0 } + fields
+    }
+}
+
+/// The values of a piece of text, or of all of it.
+struct Columns {
+    positions: Vec<[f32; 3]>,
+    residuals: Vec<[f32; 3]>,
+    colors: Colors,
+    fields: Vec<Values>,
+}
+
+/// Colours in the narrowest type that holds all values so far.
+enum Colors {
+    /// Whole numbers of 0 to 255.
+    Bytes(Vec<[u8; 3]>),
+    Floats(Vec<[f32; 3]>),
+}
+
+/// Values of a field. Text does not state how wide its numbers are.
+enum Values {
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+}
+
+impl Columns {
+    fn new(layout: &Layout) -> Self {
+        let values = |(_, wide): &(String, bool)| if *wide { Values::F64(Vec::new()) } else { Values::F32(Vec::new()) };
+        Self {
+            positions: Vec::new(),
+            residuals: Vec::new(),
+            colors: Colors::Bytes(Vec::new()),
+            fields: layout.fields.iter().map(values).collect(),
+        }
+    }
+
+    fn append(&mut self, other: &Self) -> Result<(), Error> {
+        append(&mut self.positions, &other.positions, "positions")?;
+        append(&mut self.residuals, &other.residuals, "residuals")?;
+        match (&mut self.colors, &other.colors) {
+            (Colors::Bytes(all), Colors::Bytes(more)) => append(all, more, "colours")?,
+            (Colors::Floats(all), Colors::Floats(more)) => append(all, more, "colours")?,
+            (Colors::Floats(all), Colors::Bytes(more)) => append(all, &floats(more)?, "colours")?,
+            (Colors::Bytes(all), Colors::Floats(more)) => {
+                let mut widened = floats(all)?;
+                append(&mut widened, more, "colours")?;
+                self.colors = Colors::Floats(widened);
+            }
+        }
+        for (all, more) in self.fields.iter_mut().zip(&other.fields) {
+            match (all, more) {
+                (Values::F32(all), Values::F32(more)) => append(all, more, "a field")?,
+                (Values::F64(all), Values::F64(more)) => append(all, more, "a field")?,
+                _ => unreachable!("both are made from one layout"),
+            }
+        }
+        Ok(())
+    }
+
+    fn into_cloud(self, layout: &Layout, origin: DVec3, exact: bool) -> Result<PointCloud, Error> {
+        let mut positions = self.positions;
+        positions.shrink_to_fit();
+        let mut cloud = PointCloud::new(origin, positions);
+        if self.residuals.par_iter().any(|residual| *residual != [0.0; 3]) {
+            cloud = cloud.with_residuals(self.residuals)?;
+        }
+        if layout.has_color {
+            cloud = with_colors(cloud, self.colors, exact)?;
+        }
+        for ((name, _), values) in layout.fields.iter().zip(self.fields) {
+            let values = match values {
+                Values::F32(mut values) => {
+                    values.shrink_to_fit();
+                    FieldValues::F32(values)
+                }
+                Values::F64(values) => FieldValues::F64(values),
+            };
+            cloud = cloud.with_field(name, values)?;
+        }
+        cloud = cloud.with_crs(layout.crs.clone());
+        Ok(cloud)
+    }
+}
+
+fn append<T: Copy>(all: &mut Vec<T>, more: &[T], what: &str) -> Result<(), Error> {
+    reserve(all, more.len(), what)?;
+    all.extend_from_slice(more);
+    Ok(())
+}
+
+fn floats(bytes: &[[u8; 3]]) -> Result<Vec<[f32; 3]>, Error> {
+    let mut floats = Vec::new();
+    reserve(&mut floats, bytes.len(), "colours")?;
+    floats.extend(bytes.iter().map(|color| color.map(f32::from)));
+    Ok(floats)
+}
+
+fn with_colors(cloud: PointCloud, colors: Colors, exact: bool) -> Result<PointCloud, Error> {
+    let floats = match colors {
+        // If no value exceeds 1, the colours are rather floats that happen to be 0 or 1.
+        Colors::Bytes(bytes) if bytes.par_iter().flatten().any(|&value| value > 1) => return cloud.with_colors(bytes),
+        Colors::Bytes(bytes) => floats(&bytes)?,
+        Colors::Floats(floats) => floats,
+    };
+    let largest = floats.par_iter().flatten().copied().reduce(|| 0.0, f32::max);
+    let scale = ColorScale::of(largest.into(), true);
+    let mut bytes = Vec::new();
+    reserve(&mut bytes, floats.len(), "colours")?;
+    bytes.par_extend(floats.par_iter().map(|color| color.map(|value| scale.byte(value.into()))));
+    let mut cloud = cloud.with_colors(bytes)?;
+    if exact && !floats.par_iter().flatten().all(|&value| scale.keeps(value.into())) {
+        let whole = floats.par_iter().flatten().all(|value| (0.0..=65535.0).contains(value) && value.fract() == 0.0);
+        for (channel, name) in ["Red", "Green", "Blue"].into_iter().enumerate() {
+            let values = floats.iter().map(|color| color[channel]);
+            cloud = cloud.with_field(
+                name,
+                if whole {
+                    FieldValues::U16(values.map(|value| value as u16).collect())
+                } else {
+                    FieldValues::F32(values.collect())
+                },
+            )?;
+        }
+    }
+    Ok(cloud)
+}
+
+/// Result of parsing one piece of text.
+struct Piece {
+    columns: Columns,
+    /// Sum of the counts between rows.
+    counts: usize,
+    error: Option<(usize, String)>,
+}
+
+struct Parser<'a> {
+    layout: &'a Layout,
+    origin: DVec3,
+    exact: bool,
+    /// Whether lines of a single integer are counts, not rows.
+    counts_between: bool,
+}
+
+impl Parser<'_> {
+    fn piece(&self, text: &[u8], start: usize) -> Piece {
+        let mut piece = Piece { columns: Columns::new(self.layout), counts: 0, error: None };
+        let mut fields = vec![0.0; self.layout.fields.len()];
+        let mut at = 0;
+        while at < text.len() {
+            let end = text::line_end(text, at);
+            let line = trimmed(&text[at..end]);
+            let empty = line.iter().all(u8::is_ascii_whitespace);
+            if self.counts_between && text::is_count(line.trim_ascii()) {
+                let count = std::str::from_utf8(line.trim_ascii()).ok().and_then(|line| line.parse().ok());
+                piece.counts = piece.counts.saturating_add(count.unwrap_or(usize::MAX));
+            } else if !empty
+                && !text::is_blank(line.trim_ascii_start())
+                && let Err(what) = self.row(line, &mut piece.columns, &mut fields)
+            {
+                piece.error = Some((start + at, what));
+                break;
+            }
+            at = end + 1;
+        }
+        piece
+    }
+
+    fn row(&self, line: &[u8], columns: &mut Columns, fields: &mut [f64]) -> Result<(), String> {
+        let Layout { dialect, targets, .. } = self.layout;
+        let mut cells = dialect.cells(line);
+        let (mut world, mut color) = (DVec3::ZERO, [0.0; 3]);
+        for (index, target) in targets.iter().enumerate() {
+            let cell = cells.next().ok_or_else(|| {
+                format!("{index} values where a point has {}; complete or remove the line", targets.len())
+            })?;
+            // Numbers are tried first, because values are hardly ever missing.
+            let value = || match dialect.number(cell) {
+                Err(_) if is_missing(cell) => Ok(f64::NAN),
+                value => value,
+            };
+            match *target {
+                Target::Skip => {}
+                Target::Axis(axis) => {
+                    world[axis] = dialect.number(cell).map_err(|what| {
+                        if is_missing(cell) { format!("{} is missing", ["x", "y", "z"][axis]) } else { what }
+                    })?;
+                }
+                Target::Channel(channel) => color[channel] = value()?,
+                Target::Field(field) => fields[field] = value()?,
+            }
+        }
+        if let Some(more) = cells.next() {
+            let trailing = dialect.separator != Separator::Any && more.is_empty() && cells.next().is_none();
+            if !trailing {
+                let what = format!("more values than the {} a point has, from '{}' on", targets.len(), excerpt(more));
+                return Err(what);
+            }
+        }
+        columns.positions.push((world - self.origin).as_vec3().to_array());
+        if self.exact {
+            columns.residuals.push(residual(world - self.origin));
+        }
+        if self.layout.has_color {
+            columns.colors.push(color);
+        }
+        for (values, &value) in columns.fields.iter_mut().zip(fields.iter()) {
+            match values {
+                Values::F32(values) => values.push(value as f32),
+                Values::F64(values) => values.push(value),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Colors {
+    fn push(&mut self, color: [f64; 3]) {
+        let bytes = color.map(|value| value as u8);
+        match self {
+            Self::Bytes(all) if bytes.map(f64::from) == color => all.push(bytes),
+            Self::Bytes(all) => {
+                let mut floats: Vec<[f32; 3]> = all.iter().map(|color| color.map(f32::from)).collect();
+                floats.push(color.map(|value| value as f32));
+                *self = Self::Floats(floats);
+            }
+            Self::Floats(all) => all.push(color.map(|value| value as f32)),
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! Writers of point cloud files, one module per format.
+//!
+//! # How it works
+//!
+//! A file appears complete or not at all. It is written under a temporary name in the same folder, then renamed, which
+//! replaces an existing file; on failure the temporary file is removed. What a format cannot hold is reported by
+//! [`Progress::note`], once per kind of loss.
+
+mod colors;
+mod decimal;
+mod e57;
+mod job;
+mod las;
+mod names;
+mod pcd;
+mod ply;
+mod records;
+mod registry;
+mod xyz;
+
+use self::job::{Format, Job, note_left_out};
+pub use self::registry::{check_writable, write, written_formats};

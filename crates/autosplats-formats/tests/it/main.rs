@@ -1,0 +1,18 @@
+//! The tests of the public interface, in one program, since every program is linked with all dependencies.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
+
+mod common;
+mod e57;
+mod formats;
+mod gltf;
+mod hostile;
+mod las;
+mod las_writing;
+mod losses;
+mod meshes;
+mod progress;
+mod ptx;
+mod real_files;
+mod sensors;
+mod text;

@@ -1,0 +1,19 @@
+//! Generated worlds: scenes with an exact surface, and scanners that see them.
+//!
+//! Scenes know neither files nor streams, so that tests of pictures need no reader.
+//!
+//! ```
+//! use autosplats_scenes::Scene;
+//!
+//! let (scene, count) = Scene::parse("statue:5K")?;
+//! assert_eq!(scene.sample(count, &|_| true)?.len(), 5000);
+//! # Ok::<(), autosplats_cloud::Error>(())
+//! ```
+
+mod scanner;
+mod scene;
+mod surface;
+
+pub use scanner::{Scanner, Scanners};
+pub use scene::{Hit, SCENE_PREFIX, Scene, View, parse_count};
+pub use surface::Surface;

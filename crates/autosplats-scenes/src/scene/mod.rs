@@ -1,0 +1,197 @@
+//! Generated scenes with an exact ground truth, of any number of points: for demonstrations, measurements and tests.
+//!
+//! # How it works
+//! A scene is a body of solids (`shape`, `body`) with a distance bound, subdivided into cells (`octree`). The bound
+//! yields the points, sampled evenly (`sample`) or scanned from inside (`scan`), and the true surface for
+//! [`Scene::trace`]. Everything is a function of name, time and count: the same input gives the same bytes, whatever
+//! the number of threads.
+
+mod body;
+mod cathedral;
+mod figure;
+mod fold;
+mod head;
+mod herd;
+mod horse;
+mod limb;
+mod model;
+mod name;
+mod octree;
+mod paint;
+mod pedestal;
+mod sample;
+mod scan;
+mod shape;
+mod statue;
+#[cfg(test)]
+mod tests;
+
+use std::sync::{Arc, OnceLock};
+
+use autosplats_cloud::{Axes, Error, PointCloud};
+use glam::DVec3;
+
+use self::model::{Model, Points};
+use self::name::Kind;
+pub use self::name::{SCENE_PREFIX, View, parse_count};
+
+/// A generated scene: a closed surface, known exactly, at one moment of its animation. In metres, z up.
+///
+/// Animations repeat every [`Scene::PERIOD`] seconds.
+///
+/// ```
+/// use autosplats_scenes::Scene;
+///
+/// let (scene, count) = Scene::parse("figure:2K@0.5")?;
+/// let cloud = scene.sample(count, &|_| true)?;
+/// assert_eq!((scene.name(), cloud.len()), ("figure", 2000));
+/// assert!(scene.distance(cloud.world_position(0)).abs() < 1e-3);
+/// let view = scene.view();
+/// let hit = scene.trace(view.eye, view.look_at - view.eye);
+/// assert!(hit.is_some_and(|hit| hit.distance > 1.0));
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Scene {
+    kind: Kind,
+    seconds: f64,
+    model: OnceLock<Arc<Model>>,
+}
+
+/// Intersection of a ray with the true surface of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance from the origin of the ray, in metres.
+    pub distance: f64,
+    /// Unit normal, pointing out of the solid.
+    pub normal: DVec3,
+    /// Colour of the points there, sRGB, 0 to 1.
+    pub rgb: [f32; 3],
+}
+
+impl Scene {
+    /// Period of all animations, in seconds.
+    pub const PERIOD: f64 = 2.0;
+
+    /// Maximum number of points of a scene.
+    pub const MAX_COUNT: usize = name::MAX_COUNT;
+
+    /// All scenes: name and one-line description.
+    pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
+        Kind::ALL.into_iter().map(|kind| (kind.name(), kind.about()))
+    }
+
+    /// Parses `NAME[:COUNT][@SECONDS]`, with or without the prefix `scene:`. Returns the scene and the number of
+    /// points, by default the scene's own. COUNT is a number with an optional k, m or g for thousands, millions or
+    /// billions: `546K`, `1.5M`.
+    ///
+    /// # Errors
+    /// [`Error::UnknownScene`] and [`Error::BadScene`].
+    pub fn parse(text: &str) -> Result<(Self, usize), Error> {
+        let (kind, count, seconds) = name::parse(text)?;
+        Ok((Self { kind, seconds, model: OnceLock::new() }, count))
+    }
+
+    /// The scene's name.
+    pub fn name(&self) -> &'static str {
+        self.kind.name()
+    }
+
+    /// Time of the animation, in seconds.
+    pub fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    /// Whether the scene changes with time.
+    pub fn is_animated(&self) -> bool {
+        self.kind.is_animated()
+    }
+
+    /// The same scene at another time.
+    #[must_use]
+    pub fn at(&self, seconds: f64) -> Self {
+        let model = if self.is_animated() { OnceLock::new() } else { self.model.clone() };
+        Self { kind: self.kind, seconds, model }
+    }
+
+    /// Builds the surface now, and shares it with all clones made afterwards.
+    pub fn prepare(&self) {
+        self.model();
+    }
+
+    fn model(&self) -> &Model {
+        self.model.get_or_init(|| {
+            let phase = if self.seconds.is_finite() { (self.seconds / Self::PERIOD).rem_euclid(1.0) } else { 0.0 };
+            Arc::new(match self.kind {
+                Kind::Figure => figure::scene(phase),
+                Kind::TwoScales => figure::two_scales(),
+                Kind::Statue => statue::scene(),
+                Kind::Herd => herd::scene(phase),
+                Kind::Cathedral => cathedral::scene(),
+            })
+        })
+    }
+
+    /// Samples `count` coloured points on the surface. `progress` gets the completed share, 0 to 1, from any thread,
+    /// and cancels by returning false.
+    ///
+    /// # Errors
+    /// [`Error::BadScene`] if `count` is above [`Self::MAX_COUNT`] or memory does not suffice, and
+    /// [`Error::Cancelled`] if `progress` returned false.
+    pub fn sample(&self, count: usize, progress: &(dyn Fn(f32) -> bool + Sync)) -> Result<PointCloud, Error> {
+        let refuse = |why: &str| Error::BadScene { given: format!("{}:{count}", self.name()), why: why.into() };
+        if count > Self::MAX_COUNT {
+            return Err(refuse("a scene has at most 1G points"));
+        }
+        // A failed reservation becomes an error. The zeroed vectors below would abort the process instead.
+        if Vec::<[u8; 15]>::new().try_reserve_exact(count).is_err() {
+            return Err(refuse("not enough memory for so many points"));
+        }
+        let (mut positions, mut colors) = (vec![[0.0; 3]; count], vec![[0; 3]; count]);
+        let Model { tree, points } = self.model();
+        let finished = match points {
+            Points::Sampled(shares) => sample::sample_surface(tree, shares, &mut positions, &mut colors, progress),
+            Points::Scanned(stations) => scan::scan(tree, stations, &mut positions, &mut colors, progress),
+        };
+        if !finished {
+            return Err(Error::Cancelled);
+        }
+        PointCloud::new(DVec3::ZERO, positions).with_axes(Axes::ZUp).with_colors(colors)
+    }
+
+    /// First intersection of a ray with the surface, from outside or from within a solid.
+    pub fn trace(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
+        let tree = &self.model().tree;
+        let crossing = tree.trace(origin, direction, 0.0..f64::INFINITY)?;
+        Some(Hit { distance: crossing.distance, normal: tree.normal(&crossing), rgb: tree.rgb(&crossing) })
+    }
+
+    /// Like [`trace`](Self::trace), but searches only the distances `within`, and returns only distance and colour.
+    pub(crate) fn trace_within(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        within: std::ops::Range<f64>,
+    ) -> Option<(f64, [f32; 3])> {
+        let tree = &self.model().tree;
+        let crossing = tree.trace(origin, direction, within)?;
+        Some((crossing.distance, tree.rgb(&crossing)))
+    }
+
+    /// Visits cubes that together contain the whole surface, from large to small. `visit` gets the centre, half the
+    /// side, and whether the cube has no smaller cubes inside, and returns whether to visit those. Returns whether the
+    /// scene has such cubes.
+    pub(crate) fn cubes(&self, visit: &mut dyn FnMut(DVec3, f64, bool) -> bool) -> bool {
+        self.model().tree.cubes(visit)
+    }
+
+    /// Signed distance bound: zero on the surface, negative inside, and never larger than the true distance.
+    pub fn distance(&self, position: DVec3) -> f64 {
+        self.model().tree.distance(position)
+    }
+
+    /// A view that shows the scene well.
+    pub fn view(&self) -> View {
+        self.kind.view()
+    }
+}
