@@ -286,7 +286,7 @@ fn sample_points(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
             if let Some(sweep) = recipe.sweep {
                 return Ok(swept(Surface::Scene(scene), sweep, Axes::ZUp));
             }
-            let cloud = scene.sample(recipe.count, &|_| true)?;
+            let cloud = scene.sample(recipe.count, &())?;
             // Colours are dropped, so that light alone shows the shape.
             let plain = PointCloud::new(cloud.origin(), cloud.positions().to_vec()).with_axes(Axes::ZUp);
             return Ok((Surface::Scene(scene), plain));

@@ -253,7 +253,7 @@ impl SelfTest {
         let since = |start: Instant| Some(start.elapsed().as_secs_f64() * 1e3);
         let start = Instant::now();
         let (scene, count) = Scene::parse(&format!("scene:figure:{TEST_POINTS}")).map_err(|error| said(&error))?;
-        let cloud = scene.sample(count, &|_| true).map_err(|error| said(&error))?;
+        let cloud = scene.sample(count, &()).map_err(|error| said(&error))?;
         self.generate_ms = since(start);
 
         let (mut cpu, mut pictures) = (Renderer::new(), Vec::new());

@@ -37,7 +37,7 @@ fn main() {
 /// A coloured statue in survey coordinates, like a recorded scan.
 fn survey(points: usize) -> PointCloud {
     let (scene, _) = Scene::parse("statue").unwrap();
-    let statue = scene.sample(points, &|_| true).unwrap();
+    let statue = scene.sample(points, &()).unwrap();
     let colors = statue.colors().map_or_else(|| vec![[200, 180, 160]; points], <[_]>::to_vec);
     let wave = |i: usize| (i as f64 * 0.37).sin();
     PointCloud::new(DVec3::new(512_000.0, 5_403_000.0, 300.0), statue.positions().to_vec())

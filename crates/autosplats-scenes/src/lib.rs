@@ -6,7 +6,7 @@
 //! use autosplats_scenes::Scene;
 //!
 //! let (scene, count) = Scene::parse("statue:5K")?;
-//! assert_eq!(scene.sample(count, &|_| true)?.len(), 5000);
+//! assert_eq!(scene.sample(count, &())?.len(), 5000);
 //! # Ok::<(), autosplats_cloud::Error>(())
 //! ```
 

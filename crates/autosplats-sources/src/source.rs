@@ -196,10 +196,7 @@ impl Source {
     pub fn read(&self, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
         match self {
             Self::File(path) => read_with(path, options, progress),
-            Self::Scene(scene, count) => scene.sample(*count, &|done| {
-                progress.report(done);
-                !progress.cancelled()
-            }),
+            Self::Scene(scene, count) => scene.sample(*count, progress),
             moving => {
                 let cloud = moving
                     .play(&PlayOptions::default(), options, progress)?

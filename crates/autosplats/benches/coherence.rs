@@ -103,7 +103,7 @@ fn main() {
 fn clouds(name: &str, points: usize, motion: Motion, frames: usize, still: PointCloud) -> Vec<PointCloud> {
     let Motion::Animation = motion else { return vec![still; frames] };
     let (scene, _) = Scene::parse(name).expect("a scene of this name");
-    let moment = |frame: usize| scene.at(frame as f64 / 24.0).sample(points, &|_| true).expect("enough memory");
+    let moment = |frame: usize| scene.at(frame as f64 / 24.0).sample(points, &()).expect("enough memory");
     (0..frames).map(moment).collect()
 }
 

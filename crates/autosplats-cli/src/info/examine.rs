@@ -130,10 +130,7 @@ impl Examiner {
         let _alone =
             (count as u64 * 16 >= LARGE_FILE_BYTES).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
         let bar = Bar::new(&format!("generating {name}"), self.quiet);
-        let cloud = scene.sample(count, &|done| {
-            bar.report(done);
-            !bar.cancelled()
-        })?;
+        let cloud = scene.sample(count, &bar)?;
         report.format = Some("generated scene".into());
         report.scan(&cloud, &[]);
         Ok(())

@@ -28,7 +28,7 @@ mod tests;
 
 use std::sync::{Arc, OnceLock};
 
-use autosplats_cloud::{Axes, Error, PointCloud};
+use autosplats_cloud::{Axes, Error, PointCloud, Progress};
 use glam::DVec3;
 
 use self::model::{Model, Points};
@@ -43,7 +43,7 @@ pub use self::name::{SCENE_PREFIX, View, parse_count};
 /// use autosplats_scenes::Scene;
 ///
 /// let (scene, count) = Scene::parse("figure:2K@0.5")?;
-/// let cloud = scene.sample(count, &|_| true)?;
+/// let cloud = scene.sample(count, &())?;
 /// assert_eq!((scene.name(), cloud.len()), ("figure", 2000));
 /// assert!(scene.distance(cloud.world_position(0)).abs() < 1e-3);
 /// let view = scene.view();
@@ -132,13 +132,12 @@ impl Scene {
         })
     }
 
-    /// Samples `count` coloured points on the surface. `progress` gets the completed share, 0 to 1, from any thread,
-    /// and cancels by returning false.
+    /// Samples `count` coloured points on the surface. `progress` is told from any thread.
     ///
     /// # Errors
     /// [`Error::BadScene`] if `count` is above [`Self::MAX_COUNT`] or memory does not suffice, and
-    /// [`Error::Cancelled`] if `progress` returned false.
-    pub fn sample(&self, count: usize, progress: &(dyn Fn(f32) -> bool + Sync)) -> Result<PointCloud, Error> {
+    /// [`Error::Cancelled`] if `progress` says so.
+    pub fn sample(&self, count: usize, progress: &dyn Progress) -> Result<PointCloud, Error> {
         let refuse = |why: &str| Error::BadScene { given: format!("{}:{count}", self.name()), why: why.into() };
         if count > Self::MAX_COUNT {
             return Err(refuse("a scene has at most 1G points"));

@@ -9,7 +9,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use autosplats_cloud::Random;
+use autosplats_cloud::{Progress, Random};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -18,15 +18,12 @@ use super::octree::{Leaf, Octree};
 /// Points per random stream.
 const BLOCK: usize = 16384;
 
-/// Takes the completed fraction, 0 to 1, and returns whether to continue.
-pub(super) type Progress<'a> = &'a (dyn Fn(f32) -> bool + Sync);
-
 /// Fills `positions` and `colors` block by block, in parallel. `block` gets the index of its first point and returns
 /// false if it cannot fill the block. Returns whether all blocks are filled.
 pub(super) fn by_blocks(
     positions: &mut [[f32; 3]],
     colors: &mut [[u8; 3]],
-    progress: Progress<'_>,
+    progress: &dyn Progress,
     block: impl Fn(usize, &mut [[f32; 3]], &mut [[u8; 3]]) -> bool + Sync,
 ) -> bool {
     let total = positions.len().max(1) as f32;
@@ -37,7 +34,7 @@ pub(super) fn by_blocks(
         }
         let filled = block(i * BLOCK, points, colors);
         let done = done.fetch_add(points.len(), Ordering::Relaxed) + points.len();
-        if !filled || !progress(done as f32 / total) {
+        if !filled || progress.tick(done as f32 / total).is_err() {
             stop.store(true, Ordering::Relaxed);
         }
     });
@@ -115,7 +112,7 @@ pub(super) fn sample_surface(
     shares: &[f64],
     positions: &mut [[f32; 3]],
     colors: &mut [[u8; 3]],
-    progress: Progress<'_>,
+    progress: &dyn Progress,
 ) -> bool {
     let zones: Vec<_> = (0..tree.body().zones()).map(|zone| Zone::new(tree, zone)).collect();
     // Number of points among the first `count` that lie in zones up to and including `zone`.

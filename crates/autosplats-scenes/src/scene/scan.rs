@@ -2,10 +2,11 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
+use autosplats_cloud::Progress;
 use glam::DVec3;
 
 use super::octree::Octree;
-use super::sample::{Progress, by_blocks, quantize, random_of};
+use super::sample::{by_blocks, quantize, random_of};
 
 /// Lowest elevation of a ray, in radians; the tripod hides everything below.
 const MIN_ELEVATION_RAD: f64 = -60.0 / 180.0 * std::f64::consts::PI;
@@ -17,7 +18,7 @@ pub(super) fn scan(
     stations: &[DVec3],
     positions: &mut [[f32; 3]],
     colors: &mut [[u8; 3]],
-    progress: Progress<'_>,
+    progress: &dyn Progress,
 ) -> bool {
     let per_station = positions.len().div_ceil(stations.len()).max(1);
     // The scanner measures one vertical profile after another while its head turns.

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use autosplats_cloud::{Axes, Error, PointCloud, Random};
+use autosplats_cloud::{Axes, Error, PointCloud, Progress, Random};
 use glam::DVec3;
 
 use super::Scene;
@@ -22,7 +22,7 @@ fn scene(text: &str) -> Scene {
 }
 
 fn sample(scene: &Scene, count: usize) -> PointCloud {
-    scene.sample(count, &|_| true).expect("the scene can be sampled")
+    scene.sample(count, &()).expect("the scene can be sampled")
 }
 
 /// Every scene at its beginning, built once for all tests.
@@ -206,7 +206,7 @@ fn points_are_sampled_evenly() {
     let tree = Octree::new(body, Fold::None, DVec3::splat(-3.0), 6.0, 7);
     let count = 300_000;
     let (mut positions, mut colors) = (vec![[0.0; 3]; count], vec![[0; 3]; count]);
-    assert!(sample::sample_surface(&tree, &[1.0], &mut positions, &mut colors, &|_| true), "the body is strewn");
+    assert!(sample::sample_surface(&tree, &[1.0], &mut positions, &mut colors, &()), "the body is strewn");
 
     let ball = 4.0 * std::f64::consts::PI * radius * radius;
     let faces = [half.y * half.z, half.x * half.z, half.x * half.y].map(|quarter| 4.0 * quarter);
@@ -277,12 +277,23 @@ fn horses_stay_on_the_meadow_and_the_dancer_above_the_floor() {
     }
 }
 
+/// Progress of work that nobody wants.
+struct Refused;
+
+impl Progress for Refused {
+    fn report(&self, _: f32) {}
+
+    fn cancelled(&self) -> bool {
+        true
+    }
+}
+
 #[test]
 fn saying_no_to_progress_cancels() {
     for scene in all() {
-        let error = scene.sample(100_000, &|_| false).expect_err("cancelled");
+        let error = scene.sample(100_000, &Refused).expect_err("cancelled");
         assert!(matches!(error, Error::Cancelled), "{}: {error}", scene.name());
     }
-    let error = scene("figure").sample(Scene::MAX_COUNT + 1, &|_| true).expect_err("too many");
+    let error = scene("figure").sample(Scene::MAX_COUNT + 1, &()).expect_err("too many");
     assert!(matches!(error, Error::BadScene { .. }), "{error}");
 }

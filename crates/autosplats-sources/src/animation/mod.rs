@@ -112,7 +112,7 @@ impl Animation {
     pub fn scanners(&self, count: usize, progress: &dyn Progress) -> Result<Vec<Scanner>, Error> {
         let surface = self.frames.surface(0, progress)?;
         let cloud = match &surface {
-            Surface::Scene(scene) => &still::sample(scene, EXTENT_SAMPLES, progress)?,
+            Surface::Scene(scene) => &scene.sample(EXTENT_SAMPLES, progress)?,
             Surface::Mesh(mesh) => &mesh.cloud,
         };
         let places = (0..cloud.len()).map(|index| cloud.world_position(index)).filter(|place| place.is_finite());

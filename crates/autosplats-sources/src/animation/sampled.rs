@@ -5,7 +5,7 @@ use std::sync::Arc;
 use autosplats_cloud::{Contents, Error, PointCloud, Progress, SurfaceSamples};
 use autosplats_scenes::Surface;
 
-use super::{frames::Frames, still};
+use super::frames::Frames;
 use crate::Timeline;
 
 /// Fixed seed, so that all frames have the same samples.
@@ -45,7 +45,7 @@ impl Frames for Sampled {
 
     fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
         Ok(vec![Arc::new(match self.frames.surface(frame, progress)? {
-            Surface::Scene(scene) => still::sample(&scene, self.count, progress)?,
+            Surface::Scene(scene) => scene.sample(self.count, progress)?,
             Surface::Mesh(mesh) => self.on(&mesh, progress)?,
         })])
     }

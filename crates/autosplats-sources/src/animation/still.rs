@@ -50,7 +50,7 @@ impl Frames for MovingScene {
         if let Some(cloud) = self.still.get() {
             return Ok(vec![Arc::clone(cloud)]);
         }
-        let cloud = Arc::new(sample(&self.at(frame), self.count, progress)?);
+        let cloud = Arc::new(self.at(frame).sample(self.count, progress)?);
         if !self.scene.is_animated() {
             // Another thread may have stored its result first; both results are the same.
             return Ok(vec![self.still.get_or_init(|| cloud).clone()]);
@@ -61,14 +61,6 @@ impl Frames for MovingScene {
     fn surface(&self, frame: usize, _: &dyn Progress) -> Result<Surface, Error> {
         Ok(Surface::Scene(self.at(frame)))
     }
-}
-
-/// Samples points on a scene.
-pub(super) fn sample(scene: &Scene, count: usize, progress: &dyn Progress) -> Result<PointCloud, Error> {
-    scene.sample(count, &|done| {
-        progress.report(done);
-        !progress.cancelled()
-    })
 }
 
 /// A cloud or a mesh that does not move.

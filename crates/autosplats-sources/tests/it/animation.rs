@@ -312,7 +312,7 @@ fn scenes_play_their_round() {
     let (scene, count) = Scene::parse("scene:figure:3000").unwrap();
     let figure = Animation::scene(&scene, count, 12.0).unwrap();
     assert_eq!((figure.timeline().len(), figure.timeline().duration()), (24, Duration::from_secs(2)), "one round");
-    let expected = scene.at(0.5).sample(count, &|_| true).unwrap();
+    let expected = scene.at(0.5).sample(count, &()).unwrap();
     assert_eq!(*frame(&figure, 6), expected, "half a second in");
     let (scene, count) = Scene::parse("scene:two-scales:1000").unwrap();
     let mut still = Animation::scene(&scene, count, 2.0).unwrap().play();

@@ -17,7 +17,7 @@ pub(crate) fn args() -> Vec<String> {
 /// The generated scene `name` with `count` points, and its camera.
 pub(crate) fn scene(name: &str, count: usize) -> (PointCloud, Camera) {
     let (scene, _) = Scene::parse(name).expect("a scene of this name");
-    let cloud = scene.sample(count, &|_| true).expect("enough memory");
+    let cloud = scene.sample(count, &()).expect("enough memory");
     let view = scene.view();
     let projection = Projection::PerspectiveFovDeg(view.fov_degrees);
     (cloud, Camera { eye: view.eye, look_at: view.look_at, up: view.up, projection })

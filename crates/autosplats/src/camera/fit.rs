@@ -140,7 +140,7 @@ impl Camera {
     /// use autosplats_scenes::Scene;
     ///
     /// let (scene, count) = Scene::parse("figure:2K")?;
-    /// let cloud = scene.sample(count, &|_| true)?;
+    /// let cloud = scene.sample(count, &())?;
     /// let projection = Projection::PerspectiveFovDeg(40.0);
     /// let axes = guess_axes(&cloud);
     /// let camera = Camera::fit(&cloud, axes, ViewDirection::Front, 4.0 / 3.0, projection)?;

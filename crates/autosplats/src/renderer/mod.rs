@@ -116,7 +116,7 @@ pub enum Backend {
 /// use autosplats_scenes::Scene;
 ///
 /// let (scene, count) = Scene::parse("figure:4K")?;
-/// let cloud = scene.sample(count, &|_| true)?;
+/// let cloud = scene.sample(count, &())?;
 /// let (axes, projection) = (guess_axes(&cloud), Projection::PerspectiveFovDeg(40.0));
 /// let camera = Camera::fit(&cloud, axes, ViewDirection::Front, 4.0 / 3.0, projection)?;
 /// let mut renderer = Renderer::new();

@@ -34,7 +34,7 @@ fn scene(name: &str, count: usize) -> (PointCloud, Camera) {
     let view = scene.view();
     let projection = Projection::PerspectiveFovDeg(view.fov_degrees);
     let camera = Camera { eye: view.eye, look_at: view.look_at, up: view.up, projection };
-    (scene.sample(count, &|_| true).expect("points"), camera)
+    (scene.sample(count, &()).expect("points"), camera)
 }
 
 /// Fraction of the pixels that differ by more than two steps in any channel.

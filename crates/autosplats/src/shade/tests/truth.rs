@@ -92,7 +92,7 @@ fn measure(name: &str, size: [u32; 2]) -> [Quality; 2] {
     let seen = exact.view();
     let projection = Projection::PerspectiveFovDeg(seen.fov_degrees);
     let camera = Camera { eye: seen.eye, look_at: seen.look_at, up: seen.up, projection };
-    let cloud = exact.sample(count, &|_| true).expect("points");
+    let cloud = exact.sample(count, &()).expect("points");
     let shading = Shading { color: ColorMode::Plain, background: Background::Color(BEHIND), ..Shading::default() };
     let shaded = |layers: &GBuffer| {
         let view = camera.view(DVec3::ZERO, [layers.width, layers.height]).expect("a view");
