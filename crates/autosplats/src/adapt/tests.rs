@@ -110,9 +110,16 @@ impl Case {
     fn of(cloud: &PointCloud, camera: &Camera, size: [u32; 2]) -> Self {
         let view = camera.view(DVec3::ZERO, size).expect("a view");
         let screen = Projector::default().project(cloud, &view, &ProjectRules::usual(K)).clone();
-        let rules = SearchRules { k: K, outlier_expansions: Some(1), gap_factor: Some(4.0), adaptive: true };
-        let fit_rules =
-            FitRules { k: K, splat_scale: 1.0, longest: 1.0, adaptive: true, keep_outliers: false, dot_px: 0.0 };
+        let rules = SearchRules { k: K, outlier_expansions: Some(1), gap_factor: Some(4.0), lenient: true };
+        let fit_rules = FitRules {
+            k: K,
+            splat_scale: 1.0,
+            longest: 1.0,
+            scan_lines: true,
+            keep_outliers: false,
+            compares_density: true,
+            dot_px: None,
+        };
         let fitted = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();
             screen_grid::search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);

@@ -42,12 +42,14 @@ pub(crate) struct FitRules {
     pub(crate) splat_scale: f32,
     /// Largest semi-major over semi-minor axis of an ellipse; 1 for circles.
     pub(crate) longest: f32,
-    /// Whether to keep the full length of ellipses, for adaptation, and to compare points with their surroundings.
-    pub(crate) adaptive: bool,
+    /// Whether surfels with the neighbours of a scan line keep their full length, for adaptation.
+    pub(crate) scan_lines: bool,
     /// Whether to keep outliers: points without neighbours, as dots, and points off their neighbours' surface.
     pub(crate) keep_outliers: bool,
-    /// Radius in pixels of dots that face the eye and replace all surfels; 0 draws surfaces.
-    pub(crate) dot_px: f32,
+    /// Whether the test for outliers compares a point with the density around it.
+    pub(crate) compares_density: bool,
+    /// Radius in pixels of dots that face the eye and replace all surfels; `None` draws surfaces.
+    pub(crate) dot_px: Option<f32>,
 }
 
 /// Fits a surfel to the neighbourhood of each of `queries`, indices of screen points, and appends it to `surfels`.
@@ -80,7 +82,7 @@ fn fit_blocks_with<'a, S: Simd>(
     rules: &'a FitRules,
     out: &'a mut [Surfel],
 ) {
-    let compares = rules.adaptive && screen.points.len() >= MIN_SURFACE_POINTS;
+    let compares = rules.compares_density && screen.points.len() >= MIN_SURFACE_POINTS;
     for ((out, queries), block) in out.chunks_mut(LANES).zip(queries.chunks(LANES)).zip(blocks) {
         let mut fitted = Fitted::default();
         for vector in 0..LANES / S::F32_LANES {
@@ -95,10 +97,10 @@ fn fit_blocks_with<'a, S: Simd>(
                 surfel.radius =
                     surfel.radius.min(splat_radius(MAX_CULLED_FIRST_RADII * first_radius(), rules.k as f32, rules));
             }
-            if rules.dot_px > 0.0 {
+            if let Some(dot_px) = rules.dot_px {
                 let center = point.position_view.into();
                 let normal = view.to_eye(center).normalize_or(Vec3::NEG_Z);
-                surfel.radius = rules.dot_px * view.pixel_size(center.z);
+                surfel.radius = dot_px * view.pixel_size(center.z);
                 surfel.normal = normal.to_array();
                 surfel.major_axis = normal.any_orthonormal_vector().to_array();
                 surfel.major_ratio = 1.0;
@@ -191,7 +193,7 @@ impl Fitted {
         let around = NeighborStatistics { count, mean, normal: plane.normal, variance: self.values[0].0[lane] };
         let sparser = usual_radius.map(|usual| move || k_radius / usual());
         let outlier = !rules.keep_outliers && around.is_outlier(sparser, rules.k);
-        let major_ratio = if rules.adaptive && count >= MIN_SCAN_LINE_NEIGHBORS {
+        let major_ratio = if rules.scan_lines && count >= MIN_SCAN_LINE_NEIGHBORS {
             plane.major_ratio
         } else if plane.major_ratio < f32::MAX {
             plane.major_ratio.min(rules.longest)

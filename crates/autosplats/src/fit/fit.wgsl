@@ -151,7 +151,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     } else if frame.keep_outliers == 1u {
         radius = ISOLATED_DOT_RADIUS_PX * pixel_size(center.z);
     }
-    let sparser = select(0.0, sums.k_radius / first, frame.adaptive == 1u && task.points >= MIN_SURFACE_POINTS);
+    let sparser = select(0.0, sums.k_radius / first, frame.compares_density == 1u && task.points >= MIN_SURFACE_POINTS);
     if frame.keep_outliers == 0u && is_outlier(sums, face, sparser) {
         radius = 0.0;
     }
@@ -169,7 +169,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     // A line has no width to draw.
     let drawn_ratio = select(1.0, min(face.major_ratio, frame.longest), face.major_ratio < MAX_F32);
     // Adaptation needs the full length.
-    let major_ratio = select(drawn_ratio, face.major_ratio, frame.adaptive == 1u && sums.count >= MIN_SCAN_LINE_NEIGHBORS);
+    let major_ratio = select(drawn_ratio, face.major_ratio, frame.scan_lines == 1u && sums.count >= MIN_SCAN_LINE_NEIGHBORS);
     return Surfel(
         center,
         radius,

@@ -1,6 +1,5 @@
 //! Frames on the CPU.
 
-use std::borrow::Cow;
 use std::time::Instant;
 
 use autosplats_cloud::PointCloud;
@@ -8,17 +7,18 @@ use rayon::prelude::*;
 
 use super::attributes::SplatAttributes;
 use super::exposure::Exposure;
+use super::rules::{Mode, Rules};
 use super::surfels::point_surfels;
 use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check};
 use crate::Error;
-use crate::adapt::{AdaptRules, Adapter, DepthNoise, Noise};
+use crate::adapt::{Adapter, DepthNoise, Noise};
 use crate::camera::{Camera, PlacedView, View};
 use crate::fit::orient::Sensors;
-use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
-use crate::project::{ProjectRules, Projector, ScreenPoints};
+use crate::fit::{GivenPlanes, Surfels, fit, place};
+use crate::project::{Projector, ScreenPoints};
 use crate::search::past::Past;
-use crate::search::{Neighborhoods, SearchCounts, SearchEngine, SearchRules, screen_grid};
+use crate::search::{Neighborhoods, SearchCounts, SearchEngine, screen_grid};
 use crate::shade::over_time::LastPicture;
 use crate::shade::{Image, Scene, linear_steps, shade};
 use crate::splat::{Attributes, OverTime, PointColors, Splatter};
@@ -103,14 +103,13 @@ impl CpuRenderer {
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
         let picture = check(cloud, camera, size, settings)?;
-        let (settings, dot_px) = match given {
-            Some(_) => (Cow::Borrowed(settings), 0.0),
-            None => settings.for_cloud(cloud, size),
+        let mode = match given {
+            Some(_) => Mode::Given,
+            None => Mode::of(&settings.reconstruction, cloud, size),
         };
-        let settings = &*settings;
-        let margin = if given.is_none() { settings.reconstruction.margin(size) } else { 0 };
-        let view = picture.with_margin(margin);
-        if given.is_none() {
+        let rules = Rules::new(&settings.reconstruction, mode, size, |_, _| true);
+        let view = picture.with_margin(rules.margin_px);
+        if rules.search.is_some() {
             check_engine(settings.reconstruction.engine)?;
         }
         let wanted = SplatAttributes::new(cloud, settings)?;
@@ -123,7 +122,6 @@ impl CpuRenderer {
             measures: wanted.measures,
             backs: wanted.backs,
         };
-        let settings_splat = &settings.reconstruction;
         let Self {
             projector,
             past,
@@ -150,22 +148,18 @@ impl CpuRenderer {
             clock.lap(|timings| &mut timings.fit)?;
         }
 
-        let rules = ProjectRules {
-            k: settings_splat.k,
-            halves: settings_splat.halves(),
-            grid_culling: settings_splat.grid_culling,
-        };
-        let screen = projector.project(cloud, &view, &rules);
+        let screen = projector.project(cloud, &view, &rules.project);
+        let k = rules.project.k;
         clock.lap(|timings| &mut timings.project)?;
 
-        if settings_splat.adaptive && given.is_none() {
+        if rules.adapt.is_some() {
             depth_noise.get_or_insert_with(|| DepthNoise::new(cloud));
-            adapter.begin(screen, &view, settings_splat.k);
+            adapter.begin(screen, &view, k);
             clock.lap(|timings| &mut timings.adapt)?;
         }
         let now = PlacedView { view, origin: cloud.origin() };
-        if settings_splat.starts_from_past() && given.is_none() {
-            past.begin(now, settings_splat.k);
+        if rules.coherent {
+            past.begin(now, k);
         } else {
             past.forget();
         }
@@ -174,25 +168,24 @@ impl CpuRenderer {
         splatter.begin(&view);
         let nothing = DepthNoise::default();
         let depth_noise = depth_noise.as_ref().unwrap_or(&nothing);
-        let smooths = settings_splat.smooths() && given.is_none();
-        if smooths {
-            over_time.begin(now, cloud.identity(), settings_splat, settings_splat.averaged());
+        if let Some(averaged) = rules.averaged {
+            over_time.begin(now, cloud.identity(), &settings.reconstruction, averaged);
         } else {
             over_time.forget();
             last_picture.forget();
         }
         let seen = PlacedView { view: picture, origin: cloud.origin() };
-        let following = smooths.then(|| last_picture.begin(seen, cloud.identity(), settings));
-        let reconstruct = Reconstruct { screen, view: &view, dot_px, settings, past, sensors, depth_noise, given };
+        let following = rules.averaged.map(|_| last_picture.begin(seen, cloud.identity(), settings));
+        let reconstruct = Reconstruct { screen, view: &view, rules: &rules, past, sensors, depth_noise, given };
         let mut buffers = Buffers { neighborhoods, surfels, adapter, over_time, splatter };
         let mut search_counts = reconstruct.run(&screen.active, &mut buffers, &mut clock)?;
         recovered.clear();
         let hidden = |index: u32| {
             let point = &screen.points[index as usize];
-            let radius_px = screen.density.initial_radius_px(point, settings_splat.k);
+            let radius_px = screen.density.initial_radius_px(point, k);
             buffers.splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, &view)
         };
-        let matters = |index: u32| screen.density.matters(&screen.points[index as usize], settings_splat.k, &view);
+        let matters = |index: u32| screen.density.matters(&screen.points[index as usize], k, &view);
         recovered.par_extend(screen.passive.par_iter().copied().filter(|&index| matters(index) && !hidden(index)));
         clock.lap(|timings| &mut timings.splat)?;
         if !recovered.is_empty() {
@@ -200,27 +193,25 @@ impl CpuRenderer {
         }
 
         let Buffers { surfels, adapter, over_time, splatter, .. } = buffers;
-        if settings_splat.depth_refinement {
+        if rules.depth_refinement {
             splatter.refine(surfels, &view);
             splatter.refine(surfels, &view);
         }
         splatter.attributes(surfels, &view, &attributes);
-        let adapts = settings_splat.adaptive && given.is_none();
-        let noise = if adapts { adapter.noise() } else { Noise::NONE };
-        let (layers, covered) = if settings_splat.trim {
-            splatter.trim(&view, &screen.sixteenths, (noise, settings_splat.k_radius_per_radius()))
-        } else {
-            splatter.whole()
+        let noise = if rules.adapt.is_some() { adapter.noise() } else { Noise::NONE };
+        let (layers, covered) = match &rules.trim {
+            Some(rules) => splatter.trim(&view, &screen.sixteenths, noise, rules),
+            None => splatter.whole(),
         };
-        if smooths {
-            over_time.end(now, cloud.identity(), settings_splat.clone(), surfels, screen);
+        if rules.averaged.is_some() {
+            over_time.end(now, cloud.identity(), settings.reconstruction.clone(), surfels, screen);
         }
         clock.lap(|timings| &mut timings.splat)?;
 
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view: &picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, following, image);
-        if smooths {
+        if rules.averaged.is_some() {
             last_picture.end(seen, cloud.identity(), settings.clone());
         }
         clock.lap(|timings| &mut timings.shade)?;
@@ -261,9 +252,7 @@ struct Buffers<'a> {
 struct Reconstruct<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
-    /// Radius in pixels of the dots that all points are; 0 if they are drawn as a surface.
-    dot_px: f32,
-    settings: &'a Settings,
+    rules: &'a Rules,
     past: &'a Past,
     sensors: &'a Sensors,
     depth_noise: &'a DepthNoise,
@@ -278,52 +267,32 @@ impl Reconstruct<'_> {
         Buffers { neighborhoods, surfels, adapter, over_time, splatter }: &mut Buffers<'_>,
         clock: &mut Clock<'_>,
     ) -> Result<SearchCounts, Error> {
-        let Self { screen, view, dot_px, settings, past, sensors, depth_noise, given } = *self;
-        let settings = &settings.reconstruction;
+        let Self { screen, view, rules, past, sensors, depth_noise, given } = *self;
         let first = surfels.len();
         if let Some(planes) = given {
-            place(screen, queries, &planes, view, settings.k, settings.splat_scale, surfels);
+            place(screen, queries, &planes, view, &rules.fit, surfels);
             clock.lap(|timings| &mut timings.fit)?;
             splatter.add(surfels, first, view);
             clock.lap(|timings| &mut timings.splat)?;
             return Ok(SearchCounts::default());
         }
-        let rules = SearchRules {
-            k: settings.k,
-            outlier_expansions: settings.outlier_expansions,
-            gap_factor: settings.gap_factor,
-            adaptive: settings.adaptive,
-        };
-        match settings.engine {
-            SearchEngine::ScreenGrid => screen_grid::search(screen, queries, view, &rules, past, neighborhoods),
-            SearchEngine::SplatCommunication | SearchEngine::KdTree { .. } => {
-                unreachable!("refused before the frame begins")
-            }
+        if let Some(rules) = &rules.search {
+            screen_grid::search(screen, queries, view, rules, past, neighborhoods);
         }
         past.keep(screen, queries, neighborhoods);
         clock.lap(|timings| &mut timings.search)?;
 
-        let rules = FitRules {
-            k: settings.k,
-            splat_scale: settings.splat_scale,
-            // The adapt stage depends on the shape of ellipses.
-            longest: settings.longest(),
-            adaptive: settings.adaptive,
-            keep_outliers: settings.outlier_expansions.is_none(),
-            dot_px,
-        };
-        fit(screen, queries, neighborhoods, view, &rules, surfels);
+        fit(screen, queries, neighborhoods, view, &rules.fit, surfels);
         clock.lap(|timings| &mut timings.fit)?;
 
-        if settings.adaptive {
-            let rules = AdaptRules { k: settings.k, longest: settings.longest(), keep_outliers: rules.keep_outliers };
-            adapter.adapt(&mut surfels[first..], &screen.density, view, &rules, depth_noise);
+        if let Some(rules) = &rules.adapt {
+            adapter.adapt(&mut surfels[first..], &screen.density, view, rules, depth_noise);
             clock.lap(|timings| &mut timings.adapt)?;
         }
         sensors.orient(&mut surfels[first..], view);
         clock.lap(|timings| &mut timings.fit)?;
 
-        if settings.smooths() {
+        if rules.averaged.is_some() {
             over_time.smooth(&mut surfels[first..], screen, splatter.last(), view);
         }
         splatter.add(surfels, first, view);

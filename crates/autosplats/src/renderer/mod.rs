@@ -6,6 +6,7 @@ mod exposure;
 mod first_radius;
 mod gpu;
 mod layers;
+mod rules;
 mod settings;
 mod still;
 mod surfels;

@@ -21,7 +21,7 @@ const KS: [u32; 5] = [1, 3, 10, 16, 64];
 const ROUNDING: f64 = 2e-6;
 
 fn rules(k: u32) -> SearchRules {
-    SearchRules { k, outlier_expansions: Some(3), gap_factor: Some(4.0), adaptive: true }
+    SearchRules { k, outlier_expansions: Some(3), gap_factor: Some(4.0), lenient: true }
 }
 
 fn cameras() -> [Camera; 2] {
@@ -96,13 +96,13 @@ impl Oracle {
             rules.outlier_expansions.is_some_and(|e0| exceeds(distance(1), radius(e0)))
         };
         let is_lone = beyond(1.0);
-        let is_alone = is_lone && (!rules.adaptive || beyond(f64::from(OUTLIER_RADIUS_SLACK)));
+        let is_alone = is_lone && (!rules.lenient || beyond(f64::from(OUTLIER_RADIUS_SLACK)));
         if is_alone || self.others[point].is_empty() {
             return Expected { fate: Fate::Outlier, count: 0, radius: 0.0, unsure };
         }
         let gap = rules.gap_factor.and_then(|lambda| {
             let growth = f64::from(lambda).sqrt();
-            let after = |j| if rules.adaptive && j == 1 { f64::from(lambda) } else { growth };
+            let after = |j| if rules.lenient && j == 1 { f64::from(lambda) } else { growth };
             (1..k).find(|&j| exceeds(distance(j + 1), (after(j) * distance(j)).max(growth * initial_radius)))
         });
         if is_lone && gap.is_some() {
@@ -218,7 +218,7 @@ fn every_cloud_with_every_rule() {
                 for (e0, lambda) in
                     [(Some(3), Some(4.0)), (Some(0), Some(4.0)), (Some(1), None), (None, Some(2.0)), (None, None)]
                 {
-                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0.is_some() };
+                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient: e0.is_some() };
                     let all: Vec<u32> = (0..count as u32).collect();
                     let third: Vec<u32> = all.iter().copied().step_by(3).collect();
                     let single: Vec<u32> = all.iter().copied().skip(count / 2).take(1).collect();
@@ -273,7 +273,7 @@ fn comparison_sees_each_kind_of_error() {
         SearchRules { gap_factor: None, ..rules(10) },
         SearchRules { gap_factor: Some(5.0), ..rules(10) },
         SearchRules { outlier_expansions: Some(0), ..rules(10) },
-        SearchRules { adaptive: false, ..rules(10) },
+        SearchRules { lenient: false, ..rules(10) },
     ];
     for rules in other_rules {
         assert!(outcome(rules, |_| ()).is_err(), "not noticed: {rules:?}");
@@ -296,8 +296,8 @@ fn a_surface_before_a_denser_one_is_no_outlier() {
     let queries: Vec<u32> =
         (0..screen.points.len() as u32).filter(|&q| screen.points[q as usize].position_view[2] < 40.0).collect();
     assert_eq!(queries.len(), 400, "all of the wall is seen");
-    let outliers = |adaptive: bool| {
-        let rules = SearchRules { k: 10, outlier_expansions: Some(1), gap_factor: Some(4.0), adaptive };
+    let outliers = |lenient: bool| {
+        let rules = SearchRules { k: 10, outlier_expansions: Some(1), gap_factor: Some(4.0), lenient };
         let mut neighborhoods = Neighborhoods::default();
         screen_grid::search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
         neighborhoods.counts.outliers
@@ -341,7 +341,7 @@ fn bounded_searches_stay_exact_as_far_as_they_go() {
     let positions = test_clouds::outliers(60_000);
     let (screen, view) = screen(&positions, &camera, [400, 400], 10);
     assert!(screen.points.len() > 4 * MAX_CANDIDATES, "there is more than may be read");
-    let rules = SearchRules { k: 10, outlier_expansions: None, gap_factor: None, adaptive: true };
+    let rules = SearchRules { k: 10, outlier_expansions: None, gap_factor: None, lenient: true };
     let queries: Vec<u32> = (0..screen.points.len() as u32).step_by(101).collect();
     for (engine, search) in ENGINES {
         let mut neighborhoods = Neighborhoods::default();
@@ -377,7 +377,7 @@ fn huge_coordinates_reach_no_sum() {
             positions.extend((0..huge).map(|i| (forward * (1e38 * (1.0 + 0.01 * i as f32))).to_array()));
             let (screen, view) = screen(&positions, &camera, [90, 70], k);
             let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
-            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, adaptive: true };
+            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, lenient: true };
             for (engine, search) in ENGINES {
                 let mut neighborhoods = Neighborhoods::default();
                 search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);

@@ -8,7 +8,7 @@ use super::centers::add_centers;
 use super::raster::{Tile, draw_attributes, draw_depth};
 use super::setup::RECOVER_DISTANCE_RADII;
 use super::trim::blurred::BlurredBorders;
-use super::trim::{EMPTY, Outline, Rim, rim};
+use super::trim::{EMPTY, Outline, Rim, TrimRules, rim};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
 use crate::adapt::Noise;
 use crate::camera::View;
@@ -132,15 +132,16 @@ impl Splatter {
     }
 
     /// Trims the attributes just drawn, by the points in `sixteenths` and, where they have `noise`, by their density.
-    /// K-radii are `per_radius` splat radii. Returns the layers and the number of covered pixels of the picture.
+    /// Returns the layers and the number of covered pixels of the picture.
     pub(crate) fn trim(
         &mut self,
         view: &View,
         sixteenths: &Sixteenths,
-        (noise, per_radius): (Noise, f32),
+        noise: Noise,
+        &TrimRules { k_radius_per_radius }: &TrimRules,
     ) -> (&GBuffer, usize) {
         let Self { rims, centers, layers, .. } = self;
-        let blurred = BlurredBorders::new(noise, per_radius, rims, sixteenths, view);
+        let blurred = BlurredBorders::new(noise, k_radius_per_radius, rims, sixteenths, view);
         let outline = Outline { rims, centers, sixteenths, view, blurred: blurred.as_ref() };
         let tiles = layers.tiles().into_par_iter().enumerate();
         let covered = tiles.map(|(index, mut layers)| {

@@ -112,6 +112,13 @@ const QUARTERS: [u64; 4] =
 const DISC: u64 = SIDES[0][0] | SIDES[0][1];
 const OWN: u64 = 0x3c3c_3c3c << 16;
 
+/// Settings of trimming.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TrimRules {
+    /// Ratio of the k-radius of a point with k neighbours to the radius of its splat.
+    pub(crate) k_radius_per_radius: f32,
+}
+
 /// State of a pixel for trimming: [`EMPTY`], or the reach of its heaviest splat in pixels, negated in a core.
 pub(super) type Rim = f32;
 pub(super) const EMPTY: Rim = 0.0;

@@ -35,7 +35,7 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> DeviceResults {
     let surfels = surfel_buffer(gpu, screen.capacity).expect("room");
     gpu.queue.write_buffer(&surfels, 0, bytemuck::cast_slice(&fitted));
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-    let told = FrameUniform { adaptive: 1, longest: f32::MAX, ..FrameUniform::new(&case.view, K) };
+    let told = FrameUniform { longest: f32::MAX, ..FrameUniform::new(&case.view, K) };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     let mut steps = passes.steps_cells(gpu, &frame, &screen, &buffers);

@@ -17,8 +17,15 @@ use crate::search::screen_grid::gpu::tests::{Moments, host_moments};
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE, Random};
 
-const RULES: FitRules =
-    FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false, dot_px: 0.0 };
+const RULES: FitRules = FitRules {
+    k: 10,
+    splat_scale: 1.0,
+    longest: LONGEST,
+    scan_lines: false,
+    keep_outliers: false,
+    compares_density: false,
+    dot_px: None,
+};
 
 /// Screen points, with the neighbourhoods of the active and of the passive points.
 struct Case {
@@ -33,7 +40,7 @@ impl Case {
         let view = camera.view(DVec3::ZERO, [121, 90]).expect("a view");
         let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
         let screen = Projector::default().project(&cloud, &view, &ProjectRules::usual(RULES.k)).clone();
-        let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor, adaptive: true };
+        let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor, lenient: true };
         let neighborhoods = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();
             screen_grid::search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);
@@ -68,8 +75,9 @@ impl Case {
             splat_scale: rules.splat_scale,
             longest: rules.longest,
             keep_outliers: rules.keep_outliers.into(),
-            adaptive: rules.adaptive.into(),
-            dot_px: rules.dot_px,
+            scan_lines: rules.scan_lines.into(),
+            compares_density: rules.compares_density.into(),
+            dot_px: rules.dot_px.unwrap_or(0.0),
             ..FrameUniform::new(&self.view, rules.k)
         };
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
@@ -165,7 +173,7 @@ fn the_device_makes_the_dots_that_the_host_makes() {
     let passes = FitPasses::new(&gpu).expect("passes");
     for projection in [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)] {
         let case = Case::new(&test_clouds::sphere(40), projection, Some(4.0));
-        let rules = FitRules { dot_px: 7.0, ..RULES };
+        let rules = FitRules { dot_px: Some(7.0), ..RULES };
         let host = case.on_host(&rules);
         let (device, dropped) = case.on_device(&gpu, &passes, &rules);
         assert!(host.len() > 10 && dropped == 0, "{dropped} of {} are dropped", host.len());
@@ -181,7 +189,7 @@ fn the_device_makes_the_dots_that_the_host_makes() {
     }
 }
 
-/// Adaptive rules drop more points, with few neighbours and with many.
+/// Comparing with the density around drops more points, with few neighbours and with many.
 #[test]
 fn the_device_drops_what_the_host_drops() {
     let Some(gpu) = test_gpu() else { return };
@@ -191,7 +199,7 @@ fn the_device_drops_what_the_host_drops() {
     positions.extend((0..3000).map(|_| random.direction().map(|c| c * (1.0 + 0.5 * random.unit()))));
     let case = Case::new(&positions, Projection::PerspectiveFovDeg(30.0), Some(4.0));
     let plain = case.on_host(&RULES);
-    let rules = FitRules { adaptive: true, ..RULES };
+    let rules = FitRules { scan_lines: true, compares_density: true, ..RULES };
     let host = case.on_host(&rules);
     let (device, counted) = case.on_device(&gpu, &passes, &rules);
     let is_dropped = |surfel: &Surfel| surfel.radius == 0.0;

@@ -267,7 +267,7 @@ fn judge(task: &SearchInput, block: &Block, lane: usize, squared: &[f32], known:
 ///
 /// A gap is an annulus (b, √λ·b] without a point, with b ≥ r̃₀. Starting at b = r̃₀, the furthest point within √λ·b
 /// becomes the next b, until √λ·b reaches the k-radius. If there is no such point, there may be a gap, or no point
-/// near. Adaptive rules have no further gaps.
+/// near. Lenient rules have no further gaps.
 #[inline(always)]
 fn unruled<S: Simd>(
     simd: S,

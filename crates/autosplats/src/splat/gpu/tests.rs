@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::super::layers::COVER_BYTES;
 use super::super::tests::{ALL_DISCS, Data, Discs, sixteenths, surfels, views};
-use super::super::{Attributes, GBuffer, PointColors, Splatter, TILE_AREA};
+use super::super::{Attributes, GBuffer, PointColors, Splatter, TILE_AREA, TrimRules};
 use super::*;
 use crate::adapt::Noise;
 use crate::camera::View;
@@ -120,7 +120,10 @@ impl Scene<'_> {
             backs: channels.backs,
         };
         splatter.attributes(surfels, view, &attributes);
-        let layers = splatter.trim(view, &sixteenths(surfels, view), (self.noise, 0.5 / SPLAT_SCALE)).0.clone();
+        let layers = splatter
+            .trim(view, &sixteenths(surfels, view), self.noise, &TrimRules { k_radius_per_radius: 0.5 / SPLAT_SCALE })
+            .0
+            .clone();
         (splatter, layers)
     }
 }

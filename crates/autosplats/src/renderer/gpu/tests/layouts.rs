@@ -58,7 +58,7 @@ fn mirrored() -> [Mirrored; 10] {
                 k,
                 halves,
                 grid_culling,
-                adaptive,
+                lenient,
                 keep_outliers,
                 splat_scale,
                 outlier_growth,
@@ -74,6 +74,8 @@ fn mirrored() -> [Mirrored; 10] {
                 past_shift,
                 past_focal_px,
                 dot_px,
+                scan_lines,
+                compares_density,
             },
             filled up with padding
         ),
