@@ -37,6 +37,11 @@ pub(crate) struct Projector {
 }
 
 impl Projector {
+    /// The screen points of the last projection.
+    pub(crate) fn screen(&self) -> &ScreenPoints {
+        &self.screen
+    }
+
     /// Projects `cloud`, which has fewer than 2³² points, for `view`.
     pub(crate) fn project(&mut self, cloud: &PointCloud, view: &View, rules: &ProjectRules) -> &ScreenPoints {
         let ProjectRules { k, halves, .. } = *rules;

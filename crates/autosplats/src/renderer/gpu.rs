@@ -356,7 +356,7 @@ impl GpuRenderer {
             let Self { gpu, cloud, sensors, depth_noise, frame, passes, .. } = self;
             let resident =
                 ResidentBuffers { cloud, sensors: sensors.as_ref().map(|(buffer, _)| buffer), depth_noise, frame };
-            self.prepared = Some(Prepared::new(gpu, shape, passes, resident, settings)?);
+            self.prepared = Some(Prepared::new(gpu, shape, passes, resident, &rules, settings)?);
         }
         Ok(rules)
     }

@@ -4,6 +4,7 @@ mod attributes;
 mod cpu;
 mod exposure;
 mod first_radius;
+mod frame;
 mod gpu;
 mod layers;
 mod rules;

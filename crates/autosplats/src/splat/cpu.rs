@@ -132,14 +132,14 @@ impl Splatter {
     }
 
     /// Trims the attributes just drawn, by the points in `sixteenths` and, where they have `noise`, by their density.
-    /// Returns the layers and the number of covered pixels of the picture.
+    /// Returns the number of covered pixels of the picture.
     pub(crate) fn trim(
         &mut self,
         view: &View,
         sixteenths: &Sixteenths,
         noise: Noise,
         &TrimRules { k_radius_per_radius }: &TrimRules,
-    ) -> (&GBuffer, usize) {
+    ) -> usize {
         let Self { rims, centers, layers, .. } = self;
         let blurred = BlurredBorders::new(noise, k_radius_per_radius, rims, sixteenths, view);
         let outline = Outline { rims, centers, sixteenths, view, blurred: blurred.as_ref() };
@@ -162,16 +162,15 @@ impl Splatter {
             }
             covered
         });
-        let covered = covered.sum();
-        (layers, covered)
+        covered.sum()
     }
 
-    /// The attributes just drawn, untrimmed, and the number of covered pixels of the picture.
-    pub(crate) fn whole(&self) -> (&GBuffer, usize) {
+    /// Number of covered pixels of the picture, untrimmed.
+    pub(crate) fn covered(&self) -> usize {
         let layers = &self.layers;
         let covers = |x: usize, y: usize| layers.weight[layers.index(x, y)] > 0.0;
         let row = |y: u32| (0..layers.width as usize).filter(|&x| covers(x, y as usize)).count();
-        (layers, (0..layers.height).into_par_iter().map(row).sum())
+        (0..layers.height).into_par_iter().map(row).sum()
     }
 }
 

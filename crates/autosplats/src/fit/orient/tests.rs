@@ -6,8 +6,9 @@ use super::gpu::{OrientPasses, sensor_buffer, write_sensors};
 use super::*;
 use crate::camera::{Camera, Projection};
 use crate::gpu::{Clock, FrameUniform, Gpu, Recorder, read_back, test_gpu};
+use crate::project::Round;
 use crate::project::gpu::tests::find_work;
-use crate::project::gpu::{Counter, Round, ScreenBuffers};
+use crate::project::gpu::{Counter, ScreenBuffers};
 use crate::test_clouds::Random;
 
 const ORIGIN: DVec3 = DVec3::new(4e5, 5e6, 100.0);

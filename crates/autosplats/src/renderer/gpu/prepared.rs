@@ -9,8 +9,9 @@ use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::fit::orient::gpu::OrientPasses;
 use crate::gpu::{FrameUniform, Gpu, Step};
 use crate::project::DeviceCloud;
-use crate::project::gpu::{ProjectPasses, Round, ScreenBuffers};
+use crate::project::gpu::{ProjectPasses, ScreenBuffers};
 use crate::renderer::attributes::SplatAttributes;
+use crate::renderer::frame::Stage;
 use crate::renderer::rules::Rules;
 use crate::renderer::{Reconstruction, Settings};
 use crate::search::SearchEngine;
@@ -164,12 +165,13 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Makes buffers and steps for frames of a shape.
+    /// Makes buffers and steps for frames of a shape, which the `rules` have.
     pub(super) fn new(
         gpu: &Gpu,
         shape: Shape,
         passes: &mut Passes,
         ResidentBuffers { cloud, sensors, depth_noise, frame }: ResidentBuffers<'_>,
+        rules: &Rules,
         settings: &Settings,
     ) -> Result<Self, Error> {
         passes.compile(gpu, &shape, settings)?;
@@ -200,42 +202,68 @@ impl Prepared {
             None => None,
         };
         let (steps, convergence) = gpu.checked(|| {
-            let mut steps = project.steps(gpu, frame, cloud, &screen);
-            if let Some((passes, buffers)) = &adapt {
-                steps.extend(passes.steps_cells(gpu, frame, &screen, buffers));
-            }
             let buffers =
                 SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods, past: &past_radii };
-            let EngineSteps { rounds, convergence } = search.steps(gpu, buffers)?;
-            for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(rounds) {
-                if round == Round::Recovered {
-                    steps.extend(splat.steps_recover(gpu, frame, &screen, &splats));
+            let EngineSteps { rounds: mut searches, convergence } = search.steps(gpu, buffers)?;
+            let mut steps = Vec::new();
+            for stage in Stage::list(rules) {
+                match stage {
+                    Stage::Project => steps.extend(project.steps(gpu, frame, cloud, &screen)),
+                    Stage::FillCells => {
+                        if let Some((passes, buffers)) = &adapt {
+                            steps.extend(passes.steps_cells(gpu, frame, &screen, buffers));
+                        }
+                    }
+                    Stage::Search(round) => steps.append(&mut searches[round as usize]),
+                    Stage::Fit(round) => {
+                        steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
+                    }
+                    Stage::Adapt(round) => {
+                        if let Some((passes, buffers)) = &adapt {
+                            steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, round));
+                        }
+                    }
+                    Stage::Orient(round) => {
+                        if let (Some(orient), Some(sensors)) = (&*orient, sensors) {
+                            steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
+                        }
+                    }
+                    Stage::Average(round) => {
+                        if let Some((passes, buffers)) = &over_time {
+                            steps.push(passes.step(gpu, frame, &screen, &surfels, (&layers, buffers), round));
+                        }
+                    }
+                    Stage::Draw(round) => {
+                        steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
+                    }
+                    Stage::Recover => steps.extend(splat.steps_recover(gpu, frame, &screen, &splats)),
+                    Stage::Keep => {
+                        if shape.coherent {
+                            steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));
+                        }
+                        if let Some((passes, buffers)) = &over_time {
+                            steps.extend(passes.steps_keep(gpu, frame, &screen, &surfels, buffers));
+                        }
+                    }
+                    Stage::Layers => {
+                        let noise = adapt.as_ref().map(|(_, buffers)| buffers.noise());
+                        let rules = LayerRules { depth_refinement: shape.depth_refinement, trim: shape.trim, noise };
+                        steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, rules));
+                    }
+                    Stage::Shade => {
+                        steps.extend(shade.steps(
+                            gpu,
+                            frame,
+                            &layers,
+                            &screen.counters,
+                            &picture,
+                            &settings.shading,
+                        )?);
+                        if let Some((passes, last)) = &last_picture {
+                            steps.extend(passes.steps(gpu, frame, &layers, &picture, last));
+                        }
+                    }
                 }
-                steps.extend(search);
-                steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
-                if let Some((passes, buffers)) = &adapt {
-                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, round));
-                }
-                if let (Some(orient), Some(sensors)) = (&*orient, sensors) {
-                    steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
-                }
-                if let Some((passes, buffers)) = &over_time {
-                    steps.push(passes.step(gpu, frame, &screen, &surfels, (&layers, buffers), round));
-                }
-                steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
-            }
-            if shape.coherent {
-                steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));
-            }
-            if let Some((passes, buffers)) = &over_time {
-                steps.extend(passes.steps_keep(gpu, frame, &screen, &surfels, buffers));
-            }
-            let noise = adapt.as_ref().map(|(_, buffers)| buffers.noise());
-            let rules = LayerRules { depth_refinement: shape.depth_refinement, trim: shape.trim, noise };
-            steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, rules));
-            steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
-            if let Some((passes, last)) = &last_picture {
-                steps.extend(passes.steps(gpu, frame, &layers, &picture, last));
             }
             Ok::<_, Error>((steps, convergence))
         })??;

@@ -120,10 +120,9 @@ impl Scene<'_> {
             backs: channels.backs,
         };
         splatter.attributes(surfels, view, &attributes);
-        let layers = splatter
-            .trim(view, &sixteenths(surfels, view), self.noise, &TrimRules { k_radius_per_radius: 0.5 / SPLAT_SCALE })
-            .0
-            .clone();
+        let rules = TrimRules { k_radius_per_radius: 0.5 / SPLAT_SCALE };
+        splatter.trim(view, &sixteenths(surfels, view), self.noise, &rules);
+        let layers = splatter.last().clone();
         (splatter, layers)
     }
 }

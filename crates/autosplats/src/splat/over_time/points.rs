@@ -98,9 +98,8 @@ impl<M: PartialEq> OverTime<M> {
     }
 
     /// Keeps the fits of this frame; `surfels` are all of its surfels.
-    pub(crate) fn end(&mut self, now: PlacedView, identity: u64, made: M, surfels: &Surfels, screen: &ScreenPoints) {
+    pub(crate) fn keep(&mut self, surfels: &Surfels, screen: &ScreenPoints, view: &View) {
         let Self { halves, fitted, frames, .. } = self;
-        let view = &now.view;
         halves.resize_with(2 * view.width as usize * view.height as usize, AtomicU32::default);
         halves.par_chunks_mut(TASK).for_each(|halves| halves.iter_mut().for_each(|half| *half.get_mut() = 0));
         fitted.resize(surfels.len(), Fitted::default());
@@ -119,6 +118,10 @@ impl<M: PartialEq> OverTime<M> {
                 }
             }
         });
+    }
+
+    /// Completes the frame that began. It is the last one for the next frame.
+    pub(crate) fn end(&mut self, now: PlacedView, identity: u64, made: M) {
         self.seen = Some((now, identity, made));
     }
 }
