@@ -13,6 +13,7 @@ use super::sheets::{Blend, NearbySheets, Sheets, Surface};
 use super::through::{MIN_TESTED_FIRST_RADII, shrink_to_share};
 use super::{MIN_BASE_FIRST_RADII, SCALES, STEP};
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::fit::Surfel;
 use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
 
@@ -115,8 +116,8 @@ pub(crate) struct Adapter {
 
 impl Adapter {
     /// Sums up the screen points of a new frame in cells. `k` is the number of points per cell of the density grid.
-    pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
-        self.cells.fill(screen, view, k);
+    pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32, cancel: &Cancel<'_>) {
+        self.cells.fill(screen, view, k, cancel);
         self.sheets.clear(&self.cells);
         self.usual = None;
     }
@@ -135,6 +136,7 @@ impl Adapter {
         view: &View,
         rules: &AdaptRules,
         known: &DepthNoise,
+        cancel: &Cancel<'_>,
     ) {
         let Self { cells, sheets, usual } = self;
         let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, rules.k));
@@ -157,11 +159,13 @@ impl Adapter {
             (noise, known.is_some())
         };
         if is_any_asked {
-            sheets.fit(cells, &noise, view);
+            sheets.fit(cells, &noise, view, cancel);
         }
         let sheets = &*sheets;
         surfels.par_chunks_mut(TASK).for_each_init(Default::default, |(gathered, around), surfels| {
-            adapt_all(surfels, &task, sheets, gathered, around);
+            if !cancel.is_given_up() {
+                adapt_all(surfels, &task, sheets, gathered, around);
+            }
         });
     }
 }

@@ -8,6 +8,7 @@ use super::alone::{MIN_SURFACE_POINTS, NeighborStatistics};
 use super::eigen::eigen;
 use super::{Surfel, Surfels};
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::project::ScreenPoints;
 use crate::search::{LANES, Lanes, NeighborhoodBlock, Neighborhoods};
 use crate::simd::F32s;
@@ -60,6 +61,7 @@ pub(crate) fn fit(
     view: &View,
     rules: &FitRules,
     surfels: &mut Surfels,
+    cancel: &Cancel<'_>,
 ) {
     let first = surfels.len();
     surfels.resize(first + queries.len(), Surfel::default());
@@ -67,7 +69,9 @@ pub(crate) fn fit(
     let queries = queries.par_chunks(TASK_BLOCKS * LANES);
     let blocks = neighborhoods.blocks.par_chunks(TASK_BLOCKS);
     out.zip(queries).zip(blocks).for_each(|((out, queries), blocks)| {
-        fit_blocks(screen, queries, blocks, view, rules, out);
+        if !cancel.is_given_up() {
+            fit_blocks(screen, queries, blocks, view, rules, out);
+        }
     });
 }
 

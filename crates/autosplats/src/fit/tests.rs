@@ -105,7 +105,7 @@ fn fitted(neighborhoods: &[Neighborhood], view: &View, rules: &FitRules, culling
     }
     let mut surfels = vec![Surfel::default(); 2];
     let queries: Vec<u32> = (0..neighborhoods.len() as u32).collect();
-    fit(&screen, &queries, &moments, view, rules, &mut surfels);
+    fit(&screen, &queries, &moments, view, rules, &mut surfels, &crate::cancel::NEVER);
     assert_eq!(surfels[..2], [Surfel::default(); 2], "surfels from before are kept");
     surfels.split_off(2)
 }

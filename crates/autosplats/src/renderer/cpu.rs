@@ -15,6 +15,7 @@ use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check
 use crate::Error;
 use crate::adapt::{Adapter, DepthNoise, Noise};
 use crate::camera::{Camera, PlacedView, View};
+use crate::cancel::Cancel;
 use crate::fit::orient::Sensors;
 use crate::fit::{GivenPlanes, Surfels, fit, place};
 use crate::project::{Projector, Round, ScreenPoints};
@@ -77,7 +78,7 @@ impl CpuRenderer {
         size: [u32; 2],
         settings: &Settings,
         given: Option<GivenPlanes<'_>>,
-        go_on: &dyn Fn() -> bool,
+        go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let picture = check(cloud, camera, size, settings)?;
         let mode = match given {
@@ -96,6 +97,7 @@ impl CpuRenderer {
             measures: wanted.measures,
             backs: wanted.backs,
         };
+        let cancel = Cancel::new(go_on);
         let mut frame = CpuFrame {
             renderer: self,
             cloud,
@@ -103,6 +105,7 @@ impl CpuRenderer {
             rules: &rules,
             given,
             attributes,
+            cancel: &cancel,
             picture,
             view: picture.with_margin(rules.margin_px),
             search_counts: SearchCounts::default(),
@@ -117,9 +120,7 @@ impl CpuRenderer {
             let start = Instant::now();
             frame.run(stage);
             *stage.time(&mut timings) += milliseconds_since(start);
-            if !go_on() {
-                return Err(Error::Cancelled);
-            }
+            cancel.check()?;
         }
         timings.frame = milliseconds_since(begin);
         let counts = frame.end();
@@ -136,6 +137,7 @@ struct CpuFrame<'a> {
     rules: &'a Rules,
     given: Option<GivenPlanes<'a>>,
     attributes: Attributes<'a>,
+    cancel: &'a Cancel<'a>,
     /// View of the picture, without the margin.
     picture: View,
     /// View of the screen.
@@ -196,13 +198,13 @@ impl CpuFrame<'_> {
     }
 
     fn project(&mut self) {
-        self.renderer.projector.project(self.cloud, &self.view, &self.rules.project);
+        self.renderer.projector.project(self.cloud, &self.view, &self.rules.project, self.cancel);
     }
 
     fn fill_cells(&mut self) {
         let CpuRenderer { projector, adapter, depth_noise, .. } = &mut *self.renderer;
         depth_noise.get_or_insert_with(|| DepthNoise::new(self.cloud));
-        adapter.begin(projector.screen(), &self.view, self.rules.project.k);
+        adapter.begin(projector.screen(), &self.view, self.rules.project.k, self.cancel);
     }
 
     fn search(&mut self, round: Round) {
@@ -210,7 +212,7 @@ impl CpuFrame<'_> {
         let screen = projector.screen();
         let queries = queries(screen, recovered, round);
         if let Some(rules) = &self.rules.search {
-            screen_grid::search(screen, queries, &self.view, rules, past, neighborhoods);
+            screen_grid::search(screen, queries, &self.view, rules, past, neighborhoods, self.cancel);
             self.search_counts = self.search_counts + neighborhoods.counts;
             past.keep(screen, queries, neighborhoods);
         }
@@ -222,7 +224,7 @@ impl CpuFrame<'_> {
         let queries = queries(screen, recovered, round);
         match &self.given {
             Some(planes) => place(screen, queries, planes, &self.view, &self.rules.fit, surfels),
-            None => fit(screen, queries, neighborhoods, &self.view, &self.rules.fit, surfels),
+            None => fit(screen, queries, neighborhoods, &self.view, &self.rules.fit, surfels, self.cancel),
         }
     }
 
@@ -230,7 +232,8 @@ impl CpuFrame<'_> {
         let CpuRenderer { projector, adapter, depth_noise, surfels, .. } = &mut *self.renderer;
         let screen = projector.screen();
         if let (Some(rules), Some(known)) = (&self.rules.adapt, depth_noise) {
-            adapter.adapt(&mut surfels[first(screen, round)..], &screen.density, &self.view, rules, known);
+            let surfels = &mut surfels[first(screen, round)..];
+            adapter.adapt(surfels, &screen.density, &self.view, rules, known, self.cancel);
         }
     }
 
@@ -248,7 +251,7 @@ impl CpuFrame<'_> {
 
     fn draw(&mut self, round: Round) {
         let CpuRenderer { projector, splatter, surfels, .. } = &mut *self.renderer;
-        splatter.add(surfels, first(projector.screen(), round), &self.view);
+        splatter.add(surfels, first(projector.screen(), round), &self.view, self.cancel);
     }
 
     fn recover(&mut self) {
@@ -276,14 +279,14 @@ impl CpuFrame<'_> {
         let CpuRenderer { projector, adapter, splatter, surfels, .. } = &mut *self.renderer;
         let Self { rules, view, .. } = self;
         if rules.depth_refinement {
-            splatter.refine(surfels, view);
-            splatter.refine(surfels, view);
+            splatter.refine(surfels, view, self.cancel);
+            splatter.refine(surfels, view, self.cancel);
         }
-        splatter.attributes(surfels, view, &self.attributes);
+        splatter.attributes(surfels, view, &self.attributes, self.cancel);
         self.covered = match &rules.trim {
             Some(trim) => {
                 let noise = if rules.adapt.is_some() { adapter.noise() } else { Noise::NONE };
-                splatter.trim(view, &projector.screen().sixteenths, noise, trim)
+                splatter.trim(view, &projector.screen().sixteenths, noise, trim, self.cancel)
             }
             None => splatter.covered(),
         };
@@ -295,7 +298,7 @@ impl CpuFrame<'_> {
         let exposure = exposure.of(cloud, shading);
         let scene = Scene { view: &self.picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let following = self.rules.averaged.map(|_| last_picture.following(self.picture));
-        self.value_range = shade(splatter.last(), &scene, shading, *all_layers, following, image);
+        self.value_range = shade(splatter.last(), &scene, shading, *all_layers, following, image, self.cancel);
     }
 
     /// Makes the frame the last one.

@@ -212,7 +212,7 @@ impl GpuRenderer {
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
-        go_on: &dyn Fn() -> bool,
+        go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
         // `checked` turns every failure of the device into an error.
@@ -226,7 +226,7 @@ impl GpuRenderer {
         view: &View,
         size: [u32; 2],
         settings: &Settings,
-        go_on: &dyn Fn() -> bool,
+        go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let wanted = SplatAttributes::new(cloud, settings)?;
         let started = Instant::now();

@@ -13,7 +13,7 @@ use crate::camera::{Camera, Projection, View};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::test_clouds::{self, EYE, Positions};
 
-type Search = fn(&ScreenPoints, &[u32], &View, &SearchRules, &Past, &mut Neighborhoods);
+type Search = fn(&ScreenPoints, &[u32], &View, &SearchRules, &Past, &mut Neighborhoods, &crate::cancel::Cancel<'_>);
 const ENGINES: [(&str, Search); 1] = [("screen grid", screen_grid::search)];
 
 const KS: [u32; 5] = [1, 3, 10, 16, 64];
@@ -32,7 +32,7 @@ fn cameras() -> [Camera; 2] {
 fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
     let view = camera.view(DVec3::ZERO, size).expect("a view");
-    (Projector::default().project(&cloud, &view, &ProjectRules::usual(k)).clone(), view)
+    (Projector::default().project(&cloud, &view, &ProjectRules::usual(k), &crate::cancel::NEVER).clone(), view)
 }
 
 /// The other screen points and their distances, ascending, for each screen point.
@@ -225,7 +225,15 @@ fn every_cloud_with_every_rule() {
                     for (engine, search) in ENGINES {
                         for queries in [&all, &third, &single] {
                             let mut neighborhoods = Neighborhoods::default();
-                            search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);
+                            search(
+                                &screen,
+                                queries,
+                                &view,
+                                &rules,
+                                &Past::default(),
+                                &mut neighborhoods,
+                                &crate::cancel::NEVER,
+                            );
                             let outcome = compare(&oracle, &radii, queries, &rules, &neighborhoods);
                             let projection = camera.projection;
                             assert!(outcome.is_ok(), "{engine}, {name}, {projection:?}, {rules:?}: {outcome:?}");
@@ -252,7 +260,15 @@ fn comparison_sees_each_kind_of_error() {
     let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
     let outcome = |rules: SearchRules, spoil: fn(&mut Neighborhoods)| {
         let mut neighborhoods = Neighborhoods::default();
-        screen_grid::search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
+        screen_grid::search(
+            &screen,
+            &queries,
+            &view,
+            &rules,
+            &Past::default(),
+            &mut neighborhoods,
+            &crate::cancel::NEVER,
+        );
         spoil(&mut neighborhoods);
         compare(&oracle, &radii, &queries, &self::rules(10), &neighborhoods)
     };
@@ -299,7 +315,15 @@ fn a_surface_before_a_denser_one_is_no_outlier() {
     let outliers = |lenient: bool| {
         let rules = SearchRules { k: 10, outlier_expansions: Some(1), gap_factor: Some(4.0), lenient };
         let mut neighborhoods = Neighborhoods::default();
-        screen_grid::search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
+        screen_grid::search(
+            &screen,
+            &queries,
+            &view,
+            &rules,
+            &Past::default(),
+            &mut neighborhoods,
+            &crate::cancel::NEVER,
+        );
         neighborhoods.counts.outliers
     };
     // The number of points of the surface behind in a cell varies a little.
@@ -324,7 +348,15 @@ fn ties_belong() {
         let middle = screen.points.iter().position(|p| at(p) == [0.0, 0.0, 64.0]).expect("a point in the middle");
         for (engine, search) in ENGINES {
             let mut neighborhoods = Neighborhoods::default();
-            search(&screen, &[middle as u32], &view, &rules(k), &Past::default(), &mut neighborhoods);
+            search(
+                &screen,
+                &[middle as u32],
+                &view,
+                &rules(k),
+                &Past::default(),
+                &mut neighborhoods,
+                &crate::cancel::NEVER,
+            );
             let found = found(&neighborhoods, 0);
             assert_eq!(found.count as usize, count, "{engine}, k = {k}: neighbours");
             assert_eq!(found.k_radius as f32, squared.sqrt(), "{engine}, k = {k}: k-radius");
@@ -345,7 +377,7 @@ fn bounded_searches_stay_exact_as_far_as_they_go() {
     let queries: Vec<u32> = (0..screen.points.len() as u32).step_by(101).collect();
     for (engine, search) in ENGINES {
         let mut neighborhoods = Neighborhoods::default();
-        search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
+        search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods, &crate::cancel::NEVER);
         let SearchCounts { outliers, clamped, bounded } = neighborhoods.counts;
         assert!(bounded > 0, "{engine}: none meets the bound");
         assert_eq!(outliers + clamped, bounded, "{engine}: nothing else ends a search here");
@@ -380,7 +412,7 @@ fn huge_coordinates_reach_no_sum() {
             let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, lenient: true };
             for (engine, search) in ENGINES {
                 let mut neighborhoods = Neighborhoods::default();
-                search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
+                search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods, &crate::cancel::NEVER);
                 for index in 0..queries.len() {
                     let found = found(&neighborhoods, index);
                     let sums = found.second.iter().sum::<f64>() + found.offset.element_sum() + found.k_radius;

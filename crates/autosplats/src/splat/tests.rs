@@ -201,10 +201,10 @@ fn draw_with(
     splatter.begin(view);
     // Two parts, as the renderer adds recovered points.
     let first = surfels.len() * 2 / 3;
-    splatter.add(&surfels[..first], 0, view);
-    splatter.add(surfels, first, view);
-    (0..refinements).for_each(|_| splatter.refine(surfels, view));
-    splatter.attributes(surfels, view, attributes).clone()
+    splatter.add(&surfels[..first], 0, view, &crate::cancel::NEVER);
+    splatter.add(surfels, first, view, &crate::cancel::NEVER);
+    (0..refinements).for_each(|_| splatter.refine(surfels, view, &crate::cancel::NEVER));
+    splatter.attributes(surfels, view, attributes, &crate::cancel::NEVER).clone()
 }
 
 /// Bits of all layers.

@@ -20,7 +20,7 @@ fn sheets_of(case: &Case, cells: &Cells) -> Sheets {
     sheets.clear(cells);
     sheets.level = SHEET_LEVELS[0];
     case.fitted[0].iter().filter(|surfel| surfel.radius > 0.0).for_each(|surfel| sheets.ask(surfel, cells, &case.view));
-    sheets.fit(cells, &|_, _, _| (NOISE, false), &case.view);
+    sheets.fit(cells, &|_, _, _| (NOISE, false), &case.view, &crate::cancel::NEVER);
     sheets
 }
 

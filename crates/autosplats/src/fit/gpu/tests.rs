@@ -39,11 +39,20 @@ impl Case {
         let camera = Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
         let view = camera.view(DVec3::ZERO, [121, 90]).expect("a view");
         let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
-        let screen = Projector::default().project(&cloud, &view, &ProjectRules::usual(RULES.k)).clone();
+        let screen =
+            Projector::default().project(&cloud, &view, &ProjectRules::usual(RULES.k), &crate::cancel::NEVER).clone();
         let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor, lenient: true };
         let neighborhoods = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();
-            screen_grid::search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);
+            screen_grid::search(
+                &screen,
+                queries,
+                &view,
+                &rules,
+                &Past::default(),
+                &mut neighborhoods,
+                &crate::cancel::NEVER,
+            );
             neighborhoods
         });
         Self { screen, view, neighborhoods }
@@ -60,7 +69,7 @@ impl Case {
         let mut surfels = Surfels::new();
         for (queries, neighborhoods) in [&self.screen.active, &self.screen.passive].into_iter().zip(&self.neighborhoods)
         {
-            fit(&self.screen, queries, neighborhoods, &self.view, rules, &mut surfels);
+            fit(&self.screen, queries, neighborhoods, &self.view, rules, &mut surfels, &crate::cancel::NEVER);
         }
         surfels
     }

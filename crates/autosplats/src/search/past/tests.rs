@@ -30,7 +30,7 @@ pub(crate) fn found(screen: &ScreenPoints, view: &View, k: u32) -> Vec<f32> {
     let mut past = Past::default();
     past.begin(seen(view), k);
     let mut neighborhoods = Neighborhoods::default();
-    screen_grid::search(screen, &queries, view, &rules, &past, &mut neighborhoods);
+    screen_grid::search(screen, &queries, view, &rules, &past, &mut neighborhoods, &crate::cancel::NEVER);
     past.keep(screen, &queries, &neighborhoods);
     past.end();
     past.last.pixels.iter().map(|radius| f32::from_bits(radius.load(Ordering::Relaxed))).collect()
@@ -45,7 +45,7 @@ pub(crate) fn garbage(screen: &ScreenPoints, view: &View, k: u32, random: &mut R
 fn search(screen: &ScreenPoints, view: &View, rules: &SearchRules, past: &Past) -> (Vec<Moments>, SearchCounts) {
     let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
     let mut neighborhoods = Neighborhoods::default();
-    screen_grid::search(screen, &queries, view, rules, past, &mut neighborhoods);
+    screen_grid::search(screen, &queries, view, rules, past, &mut neighborhoods, &crate::cancel::NEVER);
     (host_moments(&neighborhoods, queries.len()), neighborhoods.counts)
 }
 

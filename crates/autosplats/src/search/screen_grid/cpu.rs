@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::window::Window;
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::project::ScreenPoints;
 use crate::search::moments::{squared_distances, sum_moments};
 use crate::search::past::{Past, Trust};
@@ -36,6 +37,7 @@ pub(crate) fn search(
     rules: &SearchRules,
     past: &Past,
     neighborhoods: &mut Neighborhoods,
+    cancel: &Cancel<'_>,
 ) {
     neighborhoods.blocks.resize(queries.len().div_ceil(LANES), NeighborhoodBlock::default());
     neighborhoods.counts = neighborhoods
@@ -43,6 +45,9 @@ pub(crate) fn search(
         .par_chunks_mut(TASK_BLOCKS)
         .zip(queries.par_chunks(TASK_BLOCKS * LANES))
         .map_init(Scratch::default, |scratch, (blocks, queries)| {
+            if cancel.is_given_up() {
+                return SearchCounts::default();
+            }
             // Tasks do not depend on the number of threads, so neither may the guesses that a task starts from.
             scratch.reach = 1.0;
             scratch.trust = Trust::default();

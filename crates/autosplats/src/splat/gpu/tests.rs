@@ -106,10 +106,10 @@ impl Scene<'_> {
         let Self { surfels, view, data, .. } = *self;
         let mut splatter = Splatter::default();
         splatter.begin(view);
-        splatter.add(&surfels[..self.active], 0, view);
-        splatter.add(surfels, self.active, view);
+        splatter.add(&surfels[..self.active], 0, view, &crate::cancel::NEVER);
+        splatter.add(surfels, self.active, view, &crate::cancel::NEVER);
         if self.refinement {
-            (0..2).for_each(|_| splatter.refine(surfels, view));
+            (0..2).for_each(|_| splatter.refine(surfels, view, &crate::cancel::NEVER));
         }
         let scalars = FieldValues::F32(data.scalars.clone());
         let color = PointColors { srgb: &data.colors, linear: &data.linear };
@@ -119,9 +119,9 @@ impl Scene<'_> {
             measures: channels.measures,
             backs: channels.backs,
         };
-        splatter.attributes(surfels, view, &attributes);
+        splatter.attributes(surfels, view, &attributes, &crate::cancel::NEVER);
         let rules = TrimRules { k_radius_per_radius: 0.5 / SPLAT_SCALE };
-        splatter.trim(view, &sixteenths(surfels, view), self.noise, &rules);
+        splatter.trim(view, &sixteenths(surfels, view), self.noise, &rules, &crate::cancel::NEVER);
         let layers = splatter.last().clone();
         (splatter, layers)
     }

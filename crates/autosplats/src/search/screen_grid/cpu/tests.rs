@@ -11,7 +11,7 @@ fn screen(positions: Vec<[f32; 3]>) -> (ScreenPoints, View) {
     let camera = Camera { eye: test_clouds::EYE, look_at: DVec3::ZERO, up: DVec3::NEG_Y, projection };
     let view = camera.view(DVec3::ZERO, [400, 400]).expect("a view");
     let cloud = PointCloud::new(DVec3::ZERO, positions);
-    (Projector::default().project(&cloud, &view, &ProjectRules::usual(10)).clone(), view)
+    (Projector::default().project(&cloud, &view, &ProjectRules::usual(10), &crate::cancel::NEVER).clone(), view)
 }
 
 #[test]

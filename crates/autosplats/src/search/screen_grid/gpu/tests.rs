@@ -127,7 +127,7 @@ pub(crate) fn projected(
 ) -> (ScreenPoints, View) {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
     let view = camera.view(DVec3::ZERO, size).expect("a view");
-    (Projector::default().project(&cloud, &view, rules).clone(), view)
+    (Projector::default().project(&cloud, &view, rules, &crate::cancel::NEVER).clone(), view)
 }
 
 /// Searches both rounds on the device. Returns the neighbourhoods, and the numbers of clamped and bounded points.
@@ -158,7 +158,7 @@ pub(crate) fn on_host(screen: &ScreenPoints, view: &View, rules: &SearchRules) -
     let mut counted = [0; 2];
     for queries in [&screen.active, &screen.passive] {
         let mut neighborhoods = Neighborhoods::default();
-        screen_grid::search(screen, queries, view, rules, &Past::default(), &mut neighborhoods);
+        screen_grid::search(screen, queries, view, rules, &Past::default(), &mut neighborhoods, &crate::cancel::NEVER);
         all.extend(host_moments(&neighborhoods, queries.len()));
         counted[0] += neighborhoods.counts.clamped;
         counted[1] += neighborhoods.counts.bounded;
