@@ -227,7 +227,7 @@ impl Task<'_> {
         // The standard error of the first plane is about noise over k-radius.
         let (noise, known) = self.noise(surfel.center.into(), surfel.k_radius, surfel.source);
         let goal = Goal::new(noise, known.is_some(), surfel.k_radius, surfel.center[2], self.view);
-        if surfel.radius == 0.0 {
+        if surfel.is_dropped() {
             RefitReason::Nothing
         } else if is_row(surfel) && known.is_none() {
             // The depth steps of a depth camera form lines too, but the surface does not run along them.
@@ -257,8 +257,7 @@ fn adapt_all_with<'a, S: Simd>(
         let sparser = surfel.k_radius / initial_radius(surfel, density, view, k);
         if !matches!(call, RefitReason::Row) {
             // A line has no width to draw.
-            let is_line = surfel.major_ratio == f32::MAX;
-            surfel.major_ratio = if is_line { 1.0 } else { surfel.major_ratio.min(longest) };
+            surfel.major_ratio = if surfel.is_line() { 1.0 } else { surfel.major_ratio.min(longest) };
         }
         match call {
             RefitReason::Nothing => shrink(simd, surfel, sparser, task, gathered),
@@ -396,7 +395,7 @@ fn initial_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -
 #[inline(always)]
 fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gathered: &mut Gathered) {
     // Too few surfels have no median k-radius.
-    if surfel.radius == 0.0 || task.usual.k_radius == 0.0 {
+    if surfel.is_dropped() || task.usual.k_radius == 0.0 {
         return;
     }
     let ratio = surfel.k_radius / task.usual.k_radius;
@@ -426,7 +425,7 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gath
         }
     }
     if stray > DROPPED_OUTLIER_SCORE && !task.rules.keep_outliers {
-        surfel.radius = 0.0;
+        surfel.discard();
     } else if stray >= DOT_OUTLIER_SCORE {
         make_dot(surfel, task.view);
     }

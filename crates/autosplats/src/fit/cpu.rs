@@ -33,7 +33,8 @@ pub(super) const MAX_CULLED_FIRST_RADII: f32 = 3.0;
 /// Fewest neighbours that form a line of points; fewer are a line by chance.
 pub(super) const MIN_SCAN_LINE_NEIGHBORS: f32 = 8.0;
 
-/// Surface variation that marks a dot: the largest possible. A dot is no surface, and has no back.
+/// Surface variation of a dot: the largest possible, as a dot is no surface. So only a sensor nearly straight behind a
+/// dot sees it from the back.
 pub(super) const DOT_CURVATURE: f32 = 1.0 / 3.0;
 
 /// Settings of the fit.
@@ -112,7 +113,7 @@ fn fit_blocks_with<'a, S: Simd>(
             }
             surfel.pixel = point.pixel;
             surfel.source = screen.source[query as usize];
-            surfel.screen = query;
+            surfel.screen_and_flags |= query;
         }
     }
 }
@@ -123,7 +124,9 @@ pub(crate) struct Plane {
     pub(crate) normal: [f32; 3],
     /// Unit direction in the plane in which the neighbourhood is longest.
     pub(crate) major_axis: [f32; 3],
-    /// Ratio of the eigenvalues along and across the major axis, at least 1; `f32::MAX` for a line.
+    /// Whether the neighbourhood is a line.
+    pub(crate) is_line: bool,
+    /// Ratio of the eigenvalues along and across the major axis, 1 to 1/[`MAX_LINE_EIGENVALUE_RATIO`].
     pub(crate) major_ratio: f32,
     /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
     pub(crate) curvature: f32,
@@ -170,9 +173,10 @@ impl Fitted {
         Plane {
             normal: if away { normal.map(|c| -c) } else { normal },
             major_axis,
+            is_line: !plane && largest > 0.0,
             major_ratio: match (plane, largest > 0.0) {
                 (true, _) => largest / middle,
-                (false, true) => f32::MAX,
+                (false, true) => 1.0 / MAX_LINE_EIGENVALUE_RATIO,
                 (false, false) => 1.0,
             },
             curvature: if sum > 0.0 { least.max(0.0) / sum } else { 0.0 },
@@ -199,11 +203,11 @@ impl Fitted {
         let outlier = !rules.keep_outliers && around.is_outlier(sparser, rules.k);
         let major_ratio = if rules.scan_lines && count >= MIN_SCAN_LINE_NEIGHBORS {
             plane.major_ratio
-        } else if plane.major_ratio < f32::MAX {
-            plane.major_ratio.min(rules.longest)
-        } else {
+        } else if plane.is_line {
             // A line has no width to draw.
             1.0
+        } else {
+            plane.major_ratio.min(rules.longest)
         };
         let lone = if rules.keep_outliers { ISOLATED_DOT_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
         Surfel {
@@ -220,6 +224,7 @@ impl Fitted {
             major_axis: plane.major_axis,
             major_ratio,
             curvature: plane.curvature,
+            screen_and_flags: if plane.is_line { Surfel::LINE } else { 0 },
             ..Surfel::default()
         }
     }

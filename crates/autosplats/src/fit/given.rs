@@ -45,7 +45,7 @@ pub(crate) fn place(
             curvature: planes.curvature[source as usize],
             pixel: point.pixel,
             source,
-            screen: query,
+            screen_and_flags: query,
         }
     }));
 }

@@ -323,7 +323,7 @@ impl CpuFrame<'_> {
             active: screen.active.len(),
             passive: screen.passive.len(),
             recovered: renderer.recovered.len(),
-            outliers: renderer.surfels.iter().filter(|surfel| surfel.radius == 0.0).count(),
+            outliers: renderer.surfels.iter().filter(|surfel| surfel.is_dropped()).count(),
             clamped: search_counts.clamped,
             bounded: search_counts.bounded,
             covered,

@@ -324,7 +324,7 @@ pub(super) fn surfels(seed: u64, count: usize, discs: Discs, view: &View) -> Vec
             curvature: 0.3 * random.unit(),
             pixel: (px[1] as u32) << 16 | px[0] as u32,
             source: source as u32,
-            screen: source as u32 | if shows_back(source) { Surfel::BACK } else { 0 },
+            screen_and_flags: source as u32 | if shows_back(source) { Surfel::BACK } else { 0 },
         }
     };
     (0..count).map(&mut one).collect()

@@ -125,7 +125,7 @@ fn compare_usual(device: FrameStatistics, host: FrameStatistics) -> Result<(), S
 
 fn is_like(device: &Surfel, host: &Surfel) -> bool {
     let apart = (0..3).map(|axis| (device.center[axis] - host.center[axis]).powi(2)).sum::<f32>().sqrt();
-    let of_fit = |surfel: &Surfel| (surfel.k_radius, surfel.source, surfel.screen);
+    let of_fit = |surfel: &Surfel| (surfel.k_radius, surfel.source, surfel.screen());
     of_fit(device) == of_fit(host)
         && (device.radius - host.radius).abs() <= 1e-5 * host.radius
         && angle(device.normal, host.normal) < 0.5

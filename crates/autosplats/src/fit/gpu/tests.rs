@@ -115,7 +115,7 @@ fn covariance(moments: &Moments) -> DMat3 {
 
 fn compare(device: &Surfel, host: &Surfel, moments: &Moments) -> Result<(), String> {
     let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(format!("{what}: {device:?}, host: {host:?}")) };
-    let of_point = |surfel: &Surfel| (surfel.center, surfel.k_radius, surfel.pixel, surfel.source, surfel.screen);
+    let of_point = |surfel: &Surfel| (surfel.center, surfel.k_radius, surfel.pixel, surfel.source, surfel.screen());
     ensure(of_point(device) == of_point(host), "what is only copied")?;
     // Rounding of a quotient and a root.
     ensure((device.radius - host.radius).abs() <= 1e-6 * host.radius, "radius")?;
@@ -163,7 +163,7 @@ fn the_device_fits_what_the_host_fits() {
                         different += usize::from(outcome.is_err());
                         outcome.unwrap_or_else(|error| eprintln!("{name}, {projection:?}, {rules:?}: {error}"));
                     }
-                    let expected = device.iter().filter(|surfel| surfel.radius == 0.0).count();
+                    let expected = device.iter().filter(|surfel| surfel.is_dropped()).count();
                     assert_eq!(counted, expected, "{name}: outliers of both rounds are counted");
                     compared += host.len();
                     outliers += counted;
@@ -211,7 +211,7 @@ fn the_device_drops_what_the_host_drops() {
     let rules = FitRules { scan_lines: true, compares_density: true, ..RULES };
     let host = case.on_host(&rules);
     let (device, counted) = case.on_device(&gpu, &passes, &rules);
-    let is_dropped = |surfel: &Surfel| surfel.radius == 0.0;
+    let is_dropped = |surfel: &Surfel| surfel.is_dropped();
     let same = host.iter().zip(&device).filter(|(host, device)| is_dropped(host) == is_dropped(device)).count();
     assert!(host.len() - same <= 1, "{same} of {} are dropped alike", host.len());
     assert_eq!(counted, device.iter().filter(|surfel| is_dropped(surfel)).count(), "outliers are counted");
@@ -236,7 +236,7 @@ fn comparison_sees_each_kind_of_error() {
         Surfel { curvature: right.curvature + 1e-3, ..right },
         Surfel { major_ratio: 1.01 * right.major_ratio, ..right },
         Surfel { pixel: 0, ..right },
-        Surfel { screen: right.screen + 1, ..right },
+        Surfel { screen_and_flags: right.screen_and_flags + 1, ..right },
     ];
     assert_eq!(compare(&right, &right, &moments[5]), Ok(()), "nothing is wrong yet");
     for surfel in wrong {

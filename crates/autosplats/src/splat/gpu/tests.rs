@@ -248,7 +248,7 @@ fn blurred_disc(count: u32, away_px: f32, noise_px: f32, tilt: f32, view: &View)
         surfel
     };
     let seen = (0..count).map(|_| surfel()).filter(|surfel| surfel.center[2] > 0.0);
-    seen.zip(0..).map(|(surfel, source)| Surfel { source, screen: source, ..surfel }).collect()
+    seen.zip(0..).map(|(surfel, source)| Surfel { source, screen_and_flags: source, ..surfel }).collect()
 }
 
 #[test]

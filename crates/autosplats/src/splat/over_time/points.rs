@@ -110,7 +110,7 @@ impl<M: PartialEq> OverTime<M> {
                 let point = point_of(surfel, screen);
                 let offset = (Vec3::from(surfel.center) - point).to_array();
                 *fitted = Fitted { offset, source: surfel.source, normal: surfel.normal, frames };
-                if surfel.radius > 0.0
+                if !surfel.is_dropped()
                     && let Some(half) = half_at(view.to_pixel(point), view)
                 {
                     // Rounding may put two points into one half. The maximum always keeps the same one.
@@ -140,7 +140,7 @@ impl LastFrame<'_> {
     /// Averages a surfel. Returns the number of frames in its mean.
     fn smooth(&self, surfel: &mut Surfel, view: &View) -> f32 {
         let LookBack { reprojection, same_points, frames: most } = self.past;
-        if surfel.radius == 0.0 {
+        if surfel.is_dropped() {
             return 1.0;
         }
         let mut noisy = true;
@@ -180,5 +180,5 @@ impl LastFrame<'_> {
 
 /// The measured point of a surfel, view space.
 fn point_of(surfel: &Surfel, screen: &ScreenPoints) -> Vec3 {
-    screen.points[(surfel.screen & !Surfel::BACK) as usize].position_view.into()
+    screen.points[surfel.screen() as usize].position_view.into()
 }
