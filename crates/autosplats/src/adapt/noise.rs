@@ -4,8 +4,8 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use super::cells::Cells;
-use super::cpu::first_radius;
 use super::quadric::{Gathered, LEAST_CLUSTERS};
+use super::rules::first_radius;
 use super::sheets::SHEET_LEVELS;
 use super::{SCALES, STEP};
 use crate::camera::View;

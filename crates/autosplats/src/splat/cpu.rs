@@ -106,7 +106,7 @@ impl Splatter {
         cancel: &Cancel<'_>,
     ) -> &GBuffer {
         let Self { runs, used, depth, rims, centers, layers, empty, .. } = self;
-        if !layers.resize(view, depth.len(), attributes) {
+        if !layers.resize(view, depth.len(), attributes.optional()) {
             empty.clear();
         }
         rims.resize(depth.len(), 0.0);

@@ -28,6 +28,7 @@ mod tests;
 
 use self::blurred::BlurredBorders;
 use super::centers::mean;
+use super::layers::PixelSurface;
 use super::{TILE, TILE_AREA, tiled_index};
 use crate::camera::View;
 use crate::project::Sixteenths;
@@ -132,14 +133,6 @@ pub(super) fn rim(weight: f32, heaviest: f32, reach_px: f32) -> Rim {
     } else {
         EMPTY
     }
-}
-
-/// Visible surface at a pixel before trimming.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PixelSurface {
-    pub(super) depth: f32,
-    /// Unit normal, view space.
-    pub(super) normal: [f32; 3],
 }
 
 /// Kind of emptiness close to a pixel.

@@ -6,7 +6,7 @@ use pulp::Simd;
 use super::blend::{Blend, NearbySheets};
 use super::{SHEET_LEVELS, SHEETS, Sheets};
 use crate::adapt::cells::Cells;
-use crate::adapt::cpu::{Goal, MAX_MOVE_NOISES};
+use crate::adapt::rules::{Goal, MAX_MOVE_NOISES};
 use crate::adapt::tests::{Case, PROJECTIONS, angle};
 use crate::camera::View;
 use crate::fit::Surfel;
