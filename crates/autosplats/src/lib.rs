@@ -28,6 +28,7 @@
 
 mod adapt;
 mod camera;
+mod cancel;
 mod error;
 mod fit;
 mod gpu;

@@ -197,7 +197,12 @@ impl RenderState {
     }
 
     /// Renders a picture. `go_on` returns false once another one is more urgent.
-    fn draw(&mut self, wish: &RenderRequest, outbox: &Outbox, go_on: &dyn Fn() -> bool) -> Result<Answer, Error> {
+    fn draw(
+        &mut self,
+        wish: &RenderRequest,
+        outbox: &Outbox,
+        go_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Answer, Error> {
         let started = Instant::now();
         self.finer = None;
         let shown = self.shown(wish)?;
@@ -261,7 +266,7 @@ impl RenderState {
 
     /// Renders a picture again, supersampled. `go_on` returns false once something is requested. `None` if the size is
     /// too large for the device; the existing picture then stays.
-    fn refine(&mut self, finer: &Finer, go_on: &dyn Fn() -> bool) -> Result<Option<Answer>, Error> {
+    fn refine(&mut self, finer: &Finer, go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<Answer>, Error> {
         let Finer { wish, settings } = finer;
         let supersample = still_supersample(wish.size);
         let shown = self.shown(wish)?;

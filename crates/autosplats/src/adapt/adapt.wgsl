@@ -177,7 +177,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     // Read before the surfel moves, possibly to an empty place.
     let own_radius = initial_radius(surfel, cell_px, cell_columns);
     // A line has no width to draw.
-    surfel.major_ratio = select(1.0, min(surfel.major_ratio, frame.longest), surfel.major_ratio < MAX_F32);
+    surfel.major_ratio = select(min(surfel.major_ratio, frame.longest), 1.0, is_line(surfel));
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
     let is_noisy = calls(surfel, noise, enough);
     var surface = Surface();
@@ -200,9 +200,9 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
             surfel.radius *= min(MAX_K_RADIUS_FIRST_RADII * own_radius / surfel.k_radius, 1.0);
         }
         surfel = moved_onto(surfel, surface, noise, known);
-    } else if surfel.radius > 0.0 {
+    } else if !is_dropped(surfel) {
         surfel.radius = shrunk(surfel, own_radius);
-        if surfel.radius == 0.0 {
+        if is_dropped(surfel) {
             atomicAdd(&counters[OUTLIERS], 1u);
         }
     }

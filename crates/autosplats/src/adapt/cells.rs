@@ -5,6 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::project::ScreenPoints;
 
 /// Most slabs of depth in a cell, each as thick as the cell is wide. A surface tilted by up to 82° fills no more. A
@@ -221,7 +222,7 @@ impl Slabs {
 
 impl Cells {
     /// Sums up the screen points of a frame. `k` is the number of points per cell of the density grid.
-    pub(crate) fn fill(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
+    pub(crate) fn fill(&mut self, screen: &ScreenPoints, view: &View, k: u32, cancel: &Cancel<'_>) {
         let side_px = finest_side_px(screen.density.cell_px, k, [view.width, view.height]);
         let [mut columns, mut rows] = [view.width, view.height].map(|side| (side as usize).div_ceil(side_px));
         let levels = 1 + (columns.max(rows) / 4).max(1).ilog2() as usize;
@@ -232,7 +233,7 @@ impl Cells {
             (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
         }
         let Some((finest, coarser)) = self.levels.split_first_mut() else { return };
-        fill_finest(screen, view, finest);
+        fill_finest(screen, view, finest, cancel);
         let mut below = &*finest;
         for level in coarser {
             merge(below, view, level);
@@ -257,7 +258,7 @@ pub(crate) fn least_side_px(size: [u32; 2], most: usize) -> usize {
 }
 
 /// Fills the finest cells with points.
-fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
+fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level, cancel: &Cancel<'_>) {
     let Level { side_px, columns, .. } = *level;
     let slabs = Slabs::new(side_px, view);
     let strip_px = screen.cells.strip_px;
@@ -266,7 +267,9 @@ fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
         || vec![CellInProgress::EMPTY; columns],
         |filling, (row, out)| {
             let [y0, y1] = [row * side_px, ((row + 1) * side_px).min(view.height as usize) - 1];
-            for strip in y0 / strip_px..=y1 / strip_px {
+            // Rows stay empty if the frame is given up.
+            let strips = y0 / strip_px..y1 / strip_px + 1;
+            for strip in strips.filter(|_| !cancel.is_given_up()) {
                 for point in &screen.points[screen.cells.run(strip, 0, last_x)] {
                     let [x, y] = point.pixel_xy();
                     if (y0..=y1).contains(&y) {

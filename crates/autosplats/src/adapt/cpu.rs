@@ -1,96 +1,30 @@
-//! Moves surfels onto sheets or onto a quadric of their own, and chooses the scale of a quadric.
+//! Moves surfels onto sheets or onto a quadric of their own, and shrinks those that are no surface.
 
 use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
 use super::cells::Cells;
+use super::choose::choose;
 use super::depth::{DepthNoise, KnownNoise};
 use super::noise::{FrameStatistics, Noise, measure};
-use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Quadric};
+use super::quadric::{Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Quadric};
 use super::rows::{is_row, turn};
+use super::rules::{
+    AdaptRules, CROWD_WEIGHT_PER_NEIGHBOR, DOT_OUTLIER_SCORE, DOT_PX, DROPPED_OUTLIER_SCORE, Goal, ISOLATED_SCORE,
+    MAX_K_RADIUS_FIRST_RADII, MAX_MEAN_DISTANCE_K_RADII, MAX_NOISE_K_RADII, MAX_PLANE_DISTANCE_K_RADII,
+    OUTLIER_OFFSET_KNOWN_NOISES, OUTLIER_OFFSET_NOISES, SPARSE_MEDIAN_K_RADII, WIDER_BALL_K_RADII, first_radius,
+    initial_radius,
+};
 use super::sheets::{Blend, NearbySheets, Sheets, Surface};
 use super::through::{MIN_TESTED_FIRST_RADII, shrink_to_share};
-use super::{MIN_BASE_FIRST_RADII, SCALES, STEP};
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::fit::Surfel;
-use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
+use crate::project::{DensityGrid, ScreenPoints};
 
 /// Surfels per task.
 const TASK: usize = 256;
-/// Standard error of a normal, in radians, that is good enough where the noise is at least [`TINY_PX`].
-pub(super) const GOOD_NORMAL_ERROR_RAD: f32 = 0.025;
-/// Noise level in pixels, in [`good_enough`], below which noise may be detail finer than pixels.
-pub(super) const TINY_PX: f32 = 0.5;
-/// Added error in [`good_enough`], in radians per pixel that the noise is below [`TINY_PX`].
-pub(super) const TINY_SLOPE: f32 = 0.5;
-/// K-radius in pixels, in [`good_enough`], at which density does not change the added error.
-pub(super) const TINY_REACH_PX: f32 = 2.0;
-/// Largest factor of density in [`good_enough`]. In far views points are dense and all detail looks like noise.
-pub(super) const MOST_TINY: f32 = 3.0;
-/// Largest standard error of a normal, in radians, with which the normal is held against others.
-pub(super) const MAX_RELIABLE_ERROR_RAD: f32 = 0.12;
-/// Largest noise level, in ball radii, at which the points of a ball are a surface at all.
-pub(super) const MAX_NOISE_BALL_RADII: f32 = 0.3;
-/// Largest noise level, in k-radii, at which the first neighbours' normal is reliable; their plane states no error.
-pub(super) const MAX_NOISE_K_RADII: f32 = 0.085;
-/// Smallest trace times weight, in radii, under the root of [`Quadric::error`]: that of an evenly filled round ball.
-/// Where even this trace gives no reliable error, the fit is skipped, which saves most first balls.
-pub(super) const LEAST_TRACE: f32 = 8.0;
-/// Largest scatter of a larger ball's points about their quadric, in noise levels.
-pub(super) const MAX_SCATTER_NOISES: f32 = 1.9;
-/// [`MAX_SCATTER_NOISES`] for known noise of depth cameras; lower, as that level is raised to account for equal errors
-/// of neighbours.
-pub(super) const MAX_SCATTER_KNOWN_NOISES: f32 = 0.8;
-/// Largest difference of agreeing normals, in standard errors. Agreement falls from 1 for equal normals to 0 there.
-pub(super) const AGREE_ERRORS: f32 = 3.0;
-
-/// Largest k-radius, in first search radii, that the splat radius of a depth camera's point may follow. The k-radius of
-/// a point between two surfaces is its distance to one of them.
-pub(super) const MAX_K_RADIUS_FIRST_RADII: f32 = 3.0;
-/// Largest move of a surfel, in noise levels. A quadric further away is another surface.
-pub(super) const MAX_MOVE_NOISES: f32 = 9.0;
-/// Distance from its surface, in noise levels, beyond which a surfel is an outlier and drawn as a dot. Moved there at
-/// full size, the wide disc would hide the surfels that belong to the surface.
-pub(super) const OUTLIER_OFFSET_NOISES: f32 = 3.0;
-/// [`OUTLIER_OFFSET_NOISES`] of depth cameras. A pixel on two surfaces lies anywhere between, nearly always this far
-/// from both.
-pub(super) const OUTLIER_OFFSET_KNOWN_NOISES: f32 = 2.0;
-/// Least surface variation, times the squared ratio of k-radius to median k-radius, of a point drawn as a dot. Surface
-/// variation is up to 0.15 at edges and corners, which therefore stay where points are up to four times sparser than
-/// usual. In a cloud that fills space the mean is 0.2, and much less for some points.
-pub(super) const DOT_OUTLIER_SCORE: f32 = 2.5;
-/// Outlier score, as defined for [`DOT_OUTLIER_SCORE`], above which a point is dropped.
-pub(super) const DROPPED_OUTLIER_SCORE: f32 = 5.0;
-/// K-radius, in median k-radii, beyond which a wider ball is checked: few neighbours lie flat by chance or are cut off.
-pub(super) const SPARSE_MEDIAN_K_RADII: f32 = 2.5;
-/// Surface variation, times the squared k-radius in first search radii, beyond which a wider ball is checked. A point
-/// before a surface is sparser than its surroundings, and its neighbours are hardly flat.
-pub(super) const ISOLATED_SCORE: f32 = 0.5;
-/// Radius of the wider ball, in k-radii. A sparse point is no surface if this ball weighs less than k points.
-pub(super) const WIDER_BALL_K_RADII: f32 = 2.0;
-/// Distance from the wider ball's plane, in k-radii, beyond which a point is an outlier if the ball is over- or
-/// under-populated. Its disc would hide the neighbours. Ridges and corners reach this distance with normal populations.
-pub(super) const MAX_PLANE_DISTANCE_K_RADII: f32 = 0.4;
-/// Distance from the wider ball's mean, in k-radii, beyond which a point is an outlier if the ball is over-populated.
-/// Such a point lies beside a border. Straight borders have 0.75 and square corners 1.05, with normal populations.
-pub(super) const MAX_MEAN_DISTANCE_K_RADII: f32 = 1.0;
-/// Weight of an over-populated ball per neighbour: 1.4 times that of even points. See docs/decisions/0010-outliers.md.
-pub(super) const CROWD_WEIGHT_PER_NEIGHBOR: f32 =
-    1.4 * WIDER_BALL_K_RADII * WIDER_BALL_K_RADII * EVEN_WEIGHT / std::f32::consts::PI;
-/// Radius of a dot, in pixels.
-pub(super) const DOT_PX: f32 = 1.0;
-
-/// Settings of the stage.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct AdaptRules {
-    /// Neighbours that the fit took.
-    pub(crate) k: u32,
-    /// Longest ellipse of surfels that stay as fitted: semi-major over semi-minor axis.
-    pub(crate) longest: f32,
-    /// Whether outliers are kept instead of dropped.
-    pub(crate) keep_outliers: bool,
-}
 
 /// Input that all surfels share.
 #[derive(Clone, Copy)]
@@ -115,8 +49,8 @@ pub(crate) struct Adapter {
 
 impl Adapter {
     /// Sums up the screen points of a new frame in cells. `k` is the number of points per cell of the density grid.
-    pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
-        self.cells.fill(screen, view, k);
+    pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32, cancel: &Cancel<'_>) {
+        self.cells.fill(screen, view, k, cancel);
         self.sheets.clear(&self.cells);
         self.usual = None;
     }
@@ -135,6 +69,7 @@ impl Adapter {
         view: &View,
         rules: &AdaptRules,
         known: &DepthNoise,
+        cancel: &Cancel<'_>,
     ) {
         let Self { cells, sheets, usual } = self;
         let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, rules.k));
@@ -157,19 +92,15 @@ impl Adapter {
             (noise, known.is_some())
         };
         if is_any_asked {
-            sheets.fit(cells, &noise, view);
+            sheets.fit(cells, &noise, view, cancel);
         }
         let sheets = &*sheets;
         surfels.par_chunks_mut(TASK).for_each_init(Default::default, |(gathered, around), surfels| {
-            adapt_all(surfels, &task, sheets, gathered, around);
+            if !cancel.is_given_up() {
+                adapt_all(surfels, &task, sheets, gathered, around);
+            }
         });
     }
-}
-
-/// Base radius of the balls around a surfel, world units.
-#[inline(always)]
-pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -> f32 {
-    surfel.k_radius.max(MIN_BASE_FIRST_RADII * initial_radius(surfel, density, view, k))
 }
 
 /// Why the first neighbours of a surfel do not suffice.
@@ -188,26 +119,6 @@ struct NoiseRefit {
     known: Option<KnownNoise>,
 }
 
-/// The accuracy that a fit has to reach.
-#[derive(Clone, Copy)]
-pub(super) struct Goal {
-    /// Standard deviation of points from their surface, world units.
-    pub(super) noise: f32,
-    /// Standard error of a normal that is good enough, radians.
-    pub(super) enough: f32,
-    /// Largest scatter of points about the quadrics of larger balls, world units.
-    pub(super) scatter: f32,
-}
-
-impl Goal {
-    /// Goal for points with this k-radius and depth. `known` says that the noise is the known noise of a depth camera.
-    #[inline(always)]
-    pub(super) fn new(noise: f32, known: bool, k_radius: f32, depth: f32, view: &View) -> Self {
-        let scatter = if known { MAX_SCATTER_KNOWN_NOISES } else { MAX_SCATTER_NOISES };
-        Self { noise, enough: good_enough(noise, k_radius, depth, view), scatter: scatter * noise }
-    }
-}
-
 impl Task<'_> {
     /// Noise level at `place` in view space for the cloud's point `point`: the larger of measured and known noise.
     #[inline(always)]
@@ -223,7 +134,7 @@ impl Task<'_> {
         // The standard error of the first plane is about noise over k-radius.
         let (noise, known) = self.noise(surfel.center.into(), surfel.k_radius, surfel.source);
         let goal = Goal::new(noise, known.is_some(), surfel.k_radius, surfel.center[2], self.view);
-        if surfel.radius == 0.0 {
+        if surfel.is_dropped() {
             RefitReason::Nothing
         } else if is_row(surfel) && known.is_none() {
             // The depth steps of a depth camera form lines too, but the surface does not run along them.
@@ -253,8 +164,7 @@ fn adapt_all_with<'a, S: Simd>(
         let sparser = surfel.k_radius / initial_radius(surfel, density, view, k);
         if !matches!(call, RefitReason::Row) {
             // A line has no width to draw.
-            let is_line = surfel.major_ratio == f32::MAX;
-            surfel.major_ratio = if is_line { 1.0 } else { surfel.major_ratio.min(longest) };
+            surfel.major_ratio = if surfel.is_line() { 1.0 } else { surfel.major_ratio.min(longest) };
         }
         match call {
             RefitReason::Nothing => shrink(simd, surfel, sparser, task, gathered),
@@ -298,101 +208,12 @@ fn adapt_all_with<'a, S: Simd>(
     }
 }
 
-/// Standard error of a normal, in radians, at which no larger ball is needed: [`GOOD_NORMAL_ERROR_RAD`] +
-/// [`TINY_SLOPE`] · min(([`TINY_REACH_PX`] / k-radius)², [`MOST_TINY`]) · max([`TINY_PX`] - noise, 0), with k-radius
-/// and noise in pixels. Noise below [`TINY_PX`] may be fine detail, which larger balls would smooth away.
-#[inline(always)]
-pub(super) fn good_enough(noise: f32, k_radius: f32, depth: f32, view: &View) -> f32 {
-    let pixel = view.pixel_size(depth);
-    let dense = TINY_REACH_PX * pixel / k_radius;
-    GOOD_NORMAL_ERROR_RAD + TINY_SLOPE * (dense * dense).min(MOST_TINY) * (TINY_PX - noise / pixel).max(0.0)
-}
-
-/// The upright quadric around `center`, from balls that grow until the error is small enough. Ball radii are powers of
-/// [`STEP`] times `radius`. Where `first` is given, a normal and its standard error, the smallest ball has to agree
-/// with that normal. Returns `None` if no quadric is better than the first neighbours.
-///
-/// Each ball counts by how far it agrees with the result of the smaller ones. A ball that disagrees, or scatters too
-/// much, ends the search (stagewise aggregation, Belomestny and Spokoiny 2007). An all-or-nothing choice would depend
-/// on chance and flicker from picture to picture. See docs/decisions/0006-scale-by-agreement.md.
-#[inline(always)]
-pub(super) fn choose<S: Simd>(
-    simd: S,
-    center: [f32; 3],
-    mut radius: f32,
-    first: Option<(Vec3, f32)>,
-    &Goal { noise, enough, scatter }: &Goal,
-    (cells, view): (&Cells, &View),
-    gathered: &mut Gathered,
-) -> Option<Quadric> {
-    // A normal to agree with, and its standard error.
-    let mut reliable = first;
-    let mut best: Option<Quadric> = None;
-    // The quadric of least error, for when none is reliable.
-    let mut fallback: Option<Quadric> = None;
-    // The first ball's heights run along its plane's normal, those of larger balls along the normal found so far.
-    let mut axis = None;
-    for scale in 0..SCALES {
-        radius *= STEP;
-        // Points of a ball that the noise fills are no surface; the largest ball is taken if there is no better one.
-        let thin = noise < MAX_NOISE_BALL_RADII * radius;
-        if !thin & (scale + 1 < SCALES) {
-            continue;
-        }
-        if gathered.read(simd, cells, center, radius, view) < LEAST_CLUSTERS {
-            continue;
-        }
-        if axis.is_none() && scale + 1 < SCALES {
-            let least = noise * (1.0 / (MAX_RELIABLE_ERROR_RAD * radius));
-            if gathered.weight() < LEAST_TRACE * least * least {
-                continue;
-            }
-        }
-        let (along, curvature) = axis.unwrap_or_else(|| {
-            let plane = gathered.plane(simd);
-            (plane.axis, plane.curvature())
-        });
-        let quadric = gathered.quadric(simd, radius, along, curvature);
-        let error = quadric.error * noise;
-        if !(thin & (error < MAX_RELIABLE_ERROR_RAD)) {
-            if fallback.is_none_or(|other| quadric.error < other.error) {
-                fallback = Some(quadric);
-            }
-            continue;
-        }
-        let mut share = 1.0;
-        if let Some((normal, other)) = reliable {
-            let across = quadric.normal.cross(normal).length_squared();
-            share = 1.0 - across / (AGREE_ERRORS * AGREE_ERRORS * (error * error + other * other));
-            if !((share > 0.0) & (quadric.scatter <= scatter)) {
-                break;
-            }
-        }
-        let found = best.map_or(quadric, |smaller| smaller.towards(&quadric, share)).upright();
-        let error = found.error * noise;
-        reliable = Some((found.normal, error));
-        axis = Some((found.normal, curvature));
-        best = Some(found);
-        if error < enough {
-            break;
-        }
-    }
-    let quadric = if reliable.is_none() { fallback.map(|quadric| quadric.upright()) } else { best };
-    quadric.filter(|quadric| quadric.height.abs() <= MAX_MOVE_NOISES * noise)
-}
-
-/// First search radius of a surfel's point, world units.
-#[inline(always)]
-fn initial_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -> f32 {
-    density.initial_radius(&ScreenPoint { position_view: surfel.center, pixel: surfel.pixel }, k, view)
-}
-
 /// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill space, or are cut off from all
 /// others. `sparser` is the k-radius in first search radii.
 #[inline(always)]
 fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gathered: &mut Gathered) {
     // Too few surfels have no median k-radius.
-    if surfel.radius == 0.0 || task.usual.k_radius == 0.0 {
+    if surfel.is_dropped() || task.usual.k_radius == 0.0 {
         return;
     }
     let ratio = surfel.k_radius / task.usual.k_radius;
@@ -422,7 +243,7 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gath
         }
     }
     if stray > DROPPED_OUTLIER_SCORE && !task.rules.keep_outliers {
-        surfel.radius = 0.0;
+        surfel.discard();
     } else if stray >= DOT_OUTLIER_SCORE {
         make_dot(surfel, task.view);
     }

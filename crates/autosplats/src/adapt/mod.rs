@@ -34,12 +34,14 @@
 //! sensor's ray.
 
 mod cells;
+mod choose;
 mod cpu;
 mod depth;
 pub(crate) mod gpu;
 mod noise;
 mod quadric;
 mod rows;
+mod rules;
 mod sheets;
 #[cfg(test)]
 mod tests;
@@ -47,11 +49,12 @@ mod through;
 
 #[cfg(test)]
 pub(crate) use cells::SLABS;
-pub(crate) use cpu::{AdaptRules, Adapter};
+pub(crate) use cpu::Adapter;
 pub(crate) use depth::DepthNoise;
 #[cfg(test)]
 pub(crate) use depth::DepthRun;
 pub(crate) use noise::Noise;
+pub(crate) use rules::AdaptRules;
 #[cfg(test)]
 pub(crate) use sheets::SHEETS;
 

@@ -4,8 +4,8 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use super::cells::Cells;
-use super::cpu::first_radius;
 use super::quadric::{Gathered, LEAST_CLUSTERS};
+use super::rules::first_radius;
 use super::sheets::SHEET_LEVELS;
 use super::{SCALES, STEP};
 use crate::camera::View;
@@ -159,8 +159,8 @@ pub(crate) fn measure(
         Sampled { surfel, radius, scatter: [None; SCALES] }
     };
     let below = picked_below(surfels.len());
-    // A discarded point has no ball.
-    let is_picked = |surfel: &&Surfel| surfel.radius > 0.0 && hash_index(surfel.source) < below;
+    // A dropped point has no ball.
+    let is_picked = |surfel: &&Surfel| !surfel.is_dropped() && hash_index(surfel.source) < below;
     let mut sample: Vec<Sampled> =
         surfels.par_iter().with_min_len(PICK_TASK).filter(is_picked).copied().map(of).collect();
     sample.truncate(MOST_SAMPLED);

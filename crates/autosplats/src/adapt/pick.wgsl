@@ -24,7 +24,7 @@ fn pick(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     let place = group_index(workgroup) * 64u + local;
     let len = counters[ACTIVE];
     let below = (0xffffffffu / max(len, NOISE_SAMPLE_COUNT)) * NOISE_SAMPLE_COUNT;
-    // A discarded point has no ball.
+    // A dropped point has no ball.
     if place < len && hash_index(surfels[place].source) < below && surfels[place].radius > 0.0 {
         let at = atomicAdd(&picked[MOST_SAMPLED], 1u);
         if at < MOST_SAMPLED {

@@ -10,9 +10,11 @@ use rayon::prelude::*;
 use self::blend::CellSheets;
 pub(super) use self::blend::{Blend, NearbySheets, Surface};
 use super::cells::{Cells, Cluster, Level, SLABS};
-use super::cpu::{Goal, choose};
+use super::choose::choose;
 use super::quadric::{Gathered, Quadric, tangents};
+use super::rules::Goal;
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::fit::Surfel;
 
 mod blend;
@@ -149,7 +151,7 @@ impl Sheets {
     }
 
     /// Fits the sheets that were asked for and are not fitted yet.
-    pub(super) fn fit(&mut self, cells: &Cells, noise: &NoiseAt, view: &View) {
+    pub(super) fn fit(&mut self, cells: &Cells, noise: &NoiseAt, view: &View, cancel: &Cancel<'_>) {
         let Some(level) = cells.levels.get(self.level) else { return };
         let Self { stacks, fitted, asked, .. } = self;
         let task = Task { cells, level, asked, noise, view };
@@ -158,7 +160,9 @@ impl Sheets {
         rows.into_par_iter().take(level.rows.len()).enumerate().for_each_init(
             Gathered::default,
             |gathered, (row, (stacks, fitted))| {
-                fit_row(row, stacks, fitted, &task, gathered);
+                if !cancel.is_given_up() {
+                    fit_row(row, stacks, fitted, &task, gathered);
+                }
             },
         );
     }

@@ -109,15 +109,30 @@ impl Case {
 
     fn of(cloud: &PointCloud, camera: &Camera, size: [u32; 2]) -> Self {
         let view = camera.view(DVec3::ZERO, size).expect("a view");
-        let screen = Projector::default().project(cloud, &view, &ProjectRules::usual(K)).clone();
-        let rules = SearchRules { k: K, outlier_expansions: Some(1), gap_factor: Some(4.0), adaptive: true };
-        let fit_rules =
-            FitRules { k: K, splat_scale: 1.0, longest: 1.0, adaptive: true, keep_outliers: false, dot_px: 0.0 };
+        let screen = Projector::default().project(cloud, &view, &ProjectRules::usual(K), &crate::cancel::NEVER).clone();
+        let rules = SearchRules { k: K, outlier_expansions: Some(1), gap_factor: Some(4.0), lenient: true };
+        let fit_rules = FitRules {
+            k: K,
+            splat_scale: 1.0,
+            longest: 1.0,
+            scan_lines: true,
+            keep_outliers: false,
+            compares_density: true,
+            dot_px: None,
+        };
         let fitted = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();
-            screen_grid::search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);
+            screen_grid::search(
+                &screen,
+                queries,
+                &view,
+                &rules,
+                &Past::default(),
+                &mut neighborhoods,
+                &crate::cancel::NEVER,
+            );
             let mut surfels = Surfels::new();
-            fit(&screen, queries, &neighborhoods, &view, &fit_rules, &mut surfels);
+            fit(&screen, queries, &neighborhoods, &view, &fit_rules, &mut surfels, &crate::cancel::NEVER);
             surfels
         });
         Self { screen, view, fitted, known: DepthNoise::new(cloud) }
@@ -125,7 +140,7 @@ impl Case {
 
     pub(crate) fn cells(&self) -> Cells {
         let mut cells = Cells::default();
-        cells.fill(&self.screen, &self.view, K);
+        cells.fill(&self.screen, &self.view, K, &crate::cancel::NEVER);
         cells
     }
 
@@ -140,10 +155,17 @@ impl Case {
     /// The surfels of both rounds.
     pub(crate) fn adapted(&self) -> Surfels {
         let mut adapter = Adapter::default();
-        adapter.begin(&self.screen, &self.view, K);
+        adapter.begin(&self.screen, &self.view, K, &crate::cancel::NEVER);
         let mut adapt = |fitted: &Surfels| {
             let mut surfels = fitted.clone();
-            adapter.adapt(&mut surfels, &self.screen.density, &self.view, &ADAPT_RULES, &self.known);
+            adapter.adapt(
+                &mut surfels,
+                &self.screen.density,
+                &self.view,
+                &ADAPT_RULES,
+                &self.known,
+                &crate::cancel::NEVER,
+            );
             surfels
         };
         let [mut active, passive] = self.fitted.each_ref().map(&mut adapt);

@@ -11,8 +11,8 @@ use glam::Vec3;
 use pulp::Simd;
 
 use super::cells::{Cells, Cluster};
-use super::cpu::DOT_PX;
 use super::quadric::{Gathered, LEAST_CLUSTERS, Plane, Window};
+use super::rules::DOT_PX;
 use crate::camera::View;
 use crate::fit::{SUPPORT, Surfel};
 

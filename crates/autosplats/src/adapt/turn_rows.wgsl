@@ -76,13 +76,13 @@ fn turn_rows(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
         if area.radius == 0.0 {
             out.radius = shrunk(out, own_radius);
         }
-        let is_dropped = out.radius == 0.0;
+        let is_out = is_dropped(out);
         if surfel.k_radius > MIN_TESTED_FIRST_RADII * own_radius {
             out.radius = opened(out, 0.0);
         }
         if local == 0u {
             surfels[place] = out;
-            if is_dropped {
+            if is_out {
                 atomicAdd(&counters[OUTLIERS], 1u);
             }
         }

@@ -8,6 +8,7 @@ use super::alone::{MIN_SURFACE_POINTS, NeighborStatistics};
 use super::eigen::eigen;
 use super::{Surfel, Surfels};
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::project::ScreenPoints;
 use crate::search::{LANES, Lanes, NeighborhoodBlock, Neighborhoods};
 use crate::simd::F32s;
@@ -32,7 +33,8 @@ pub(super) const MAX_CULLED_FIRST_RADII: f32 = 3.0;
 /// Fewest neighbours that form a line of points; fewer are a line by chance.
 pub(super) const MIN_SCAN_LINE_NEIGHBORS: f32 = 8.0;
 
-/// Surface variation that marks a dot: the largest possible. A dot is no surface, and has no back.
+/// Surface variation of a dot: the largest possible, as a dot is no surface. So only a sensor nearly straight behind a
+/// dot sees it from the back.
 pub(super) const DOT_CURVATURE: f32 = 1.0 / 3.0;
 
 /// Settings of the fit.
@@ -42,12 +44,14 @@ pub(crate) struct FitRules {
     pub(crate) splat_scale: f32,
     /// Largest semi-major over semi-minor axis of an ellipse; 1 for circles.
     pub(crate) longest: f32,
-    /// Whether to keep the full length of ellipses, for adaptation, and to compare points with their surroundings.
-    pub(crate) adaptive: bool,
+    /// Whether surfels with the neighbours of a scan line keep their full length, for adaptation.
+    pub(crate) scan_lines: bool,
     /// Whether to keep outliers: points without neighbours, as dots, and points off their neighbours' surface.
     pub(crate) keep_outliers: bool,
-    /// Radius in pixels of dots that face the eye and replace all surfels; 0 draws surfaces.
-    pub(crate) dot_px: f32,
+    /// Whether the test for outliers compares a point with the density around it.
+    pub(crate) compares_density: bool,
+    /// Radius in pixels of dots that face the eye and replace all surfels; `None` draws surfaces.
+    pub(crate) dot_px: Option<f32>,
 }
 
 /// Fits a surfel to the neighbourhood of each of `queries`, indices of screen points, and appends it to `surfels`.
@@ -58,6 +62,7 @@ pub(crate) fn fit(
     view: &View,
     rules: &FitRules,
     surfels: &mut Surfels,
+    cancel: &Cancel<'_>,
 ) {
     let first = surfels.len();
     surfels.resize(first + queries.len(), Surfel::default());
@@ -65,7 +70,9 @@ pub(crate) fn fit(
     let queries = queries.par_chunks(TASK_BLOCKS * LANES);
     let blocks = neighborhoods.blocks.par_chunks(TASK_BLOCKS);
     out.zip(queries).zip(blocks).for_each(|((out, queries), blocks)| {
-        fit_blocks(screen, queries, blocks, view, rules, out);
+        if !cancel.is_given_up() {
+            fit_blocks(screen, queries, blocks, view, rules, out);
+        }
     });
 }
 
@@ -80,7 +87,7 @@ fn fit_blocks_with<'a, S: Simd>(
     rules: &'a FitRules,
     out: &'a mut [Surfel],
 ) {
-    let compares = rules.adaptive && screen.points.len() >= MIN_SURFACE_POINTS;
+    let compares = rules.compares_density && screen.points.len() >= MIN_SURFACE_POINTS;
     for ((out, queries), block) in out.chunks_mut(LANES).zip(queries.chunks(LANES)).zip(blocks) {
         let mut fitted = Fitted::default();
         for vector in 0..LANES / S::F32_LANES {
@@ -95,10 +102,10 @@ fn fit_blocks_with<'a, S: Simd>(
                 surfel.radius =
                     surfel.radius.min(splat_radius(MAX_CULLED_FIRST_RADII * first_radius(), rules.k as f32, rules));
             }
-            if rules.dot_px > 0.0 {
+            if let Some(dot_px) = rules.dot_px {
                 let center = point.position_view.into();
                 let normal = view.to_eye(center).normalize_or(Vec3::NEG_Z);
-                surfel.radius = rules.dot_px * view.pixel_size(center.z);
+                surfel.radius = dot_px * view.pixel_size(center.z);
                 surfel.normal = normal.to_array();
                 surfel.major_axis = normal.any_orthonormal_vector().to_array();
                 surfel.major_ratio = 1.0;
@@ -106,7 +113,7 @@ fn fit_blocks_with<'a, S: Simd>(
             }
             surfel.pixel = point.pixel;
             surfel.source = screen.source[query as usize];
-            surfel.screen = query;
+            surfel.screen_and_flags |= query;
         }
     }
 }
@@ -117,7 +124,9 @@ pub(crate) struct Plane {
     pub(crate) normal: [f32; 3],
     /// Unit direction in the plane in which the neighbourhood is longest.
     pub(crate) major_axis: [f32; 3],
-    /// Ratio of the eigenvalues along and across the major axis, at least 1; `f32::MAX` for a line.
+    /// Whether the neighbourhood is a line.
+    pub(crate) is_line: bool,
+    /// Ratio of the eigenvalues along and across the major axis, 1 to 1/[`MAX_LINE_EIGENVALUE_RATIO`].
     pub(crate) major_ratio: f32,
     /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
     pub(crate) curvature: f32,
@@ -164,9 +173,10 @@ impl Fitted {
         Plane {
             normal: if away { normal.map(|c| -c) } else { normal },
             major_axis,
+            is_line: !plane && largest > 0.0,
             major_ratio: match (plane, largest > 0.0) {
                 (true, _) => largest / middle,
-                (false, true) => f32::MAX,
+                (false, true) => 1.0 / MAX_LINE_EIGENVALUE_RATIO,
                 (false, false) => 1.0,
             },
             curvature: if sum > 0.0 { least.max(0.0) / sum } else { 0.0 },
@@ -191,13 +201,13 @@ impl Fitted {
         let around = NeighborStatistics { count, mean, normal: plane.normal, variance: self.values[0].0[lane] };
         let sparser = usual_radius.map(|usual| move || k_radius / usual());
         let outlier = !rules.keep_outliers && around.is_outlier(sparser, rules.k);
-        let major_ratio = if rules.adaptive && count >= MIN_SCAN_LINE_NEIGHBORS {
+        let major_ratio = if rules.scan_lines && count >= MIN_SCAN_LINE_NEIGHBORS {
             plane.major_ratio
-        } else if plane.major_ratio < f32::MAX {
-            plane.major_ratio.min(rules.longest)
-        } else {
+        } else if plane.is_line {
             // A line has no width to draw.
             1.0
+        } else {
+            plane.major_ratio.min(rules.longest)
         };
         let lone = if rules.keep_outliers { ISOLATED_DOT_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
         Surfel {
@@ -214,6 +224,7 @@ impl Fitted {
             major_axis: plane.major_axis,
             major_ratio,
             curvature: plane.curvature,
+            screen_and_flags: if plane.is_line { Surfel::LINE } else { 0 },
             ..Surfel::default()
         }
     }

@@ -56,6 +56,7 @@ var<workgroup> outliers: atomic<u32>;
 struct Plane {
     normal: vec3f,
     major_axis: vec3f,
+    is_line: bool,
     major_ratio: f32,
     curvature: f32,
     // Variance of the point and its neighbours along the normal, in squared k-radii.
@@ -102,17 +103,20 @@ fn plane(sums: Neighborhood, eye: vec3f) -> Plane {
     let largest = found.values.z;
     var normal = found.least;
     var major_axis = found.largest;
+    let is_plane = middle > MAX_LINE_EIGENVALUE_RATIO * largest;
     var major_ratio = largest / middle;
-    if !(middle > MAX_LINE_EIGENVALUE_RATIO * largest) {
+    if !is_plane {
         normal = facing(eye, major_axis, largest > 0.0);
         // A circle may have any tangent.
         major_axis = select(any_orthonormal(normal), major_axis, largest > 0.0);
-        major_ratio = select(1.0, MAX_F32, largest > 0.0);
+        major_ratio = select(1.0, 1.0 / MAX_LINE_EIGENVALUE_RATIO, largest > 0.0);
     }
     let least = max(found.values.x, 0.0);
     let sum = least + middle + largest;
     let curvature = select(0.0, least / sum, sum > 0.0);
-    return Plane(select(normal, -normal, product(normal, eye) < 0.0), major_axis, major_ratio, curvature, found.values.x);
+    let is_line = !is_plane && largest > 0.0;
+    let facing_normal = select(normal, -normal, product(normal, eye) < 0.0);
+    return Plane(facing_normal, major_axis, is_line, major_ratio, curvature, found.values.x);
 }
 
 // Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6]. With a gap, k neighbours count.
@@ -151,25 +155,35 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     } else if frame.keep_outliers == 1u {
         radius = ISOLATED_DOT_RADIUS_PX * pixel_size(center.z);
     }
-    let sparser = select(0.0, sums.k_radius / first, frame.adaptive == 1u && task.points >= MIN_SURFACE_POINTS);
+    let sparser = select(0.0, sums.k_radius / first, frame.compares_density == 1u && task.points >= MIN_SURFACE_POINTS);
     if frame.keep_outliers == 0u && is_outlier(sums, face, sparser) {
         radius = 0.0;
     }
     if center.z > culling_depth(bitcast<f32>(cell.y), task.cell_px) {
         radius = min(radius, splat_radius(MAX_CULLED_FIRST_RADII * first, f32(frame.k)));
     }
+    let screen_and_flags = query | select(0u, LINE, face.is_line);
     if frame.dot_px > 0.0 {
         let normal = normalized_or(to_eye(center), vec3f(0.0, 0.0, -1.0));
         let dot_radius = frame.dot_px * pixel_size(center.z);
         let axis = any_orthonormal(normal);
         return Surfel(
-            center, dot_radius, normal, sums.k_radius, axis, 1.0, DOT_CURVATURE, point.pixel, source[query], query,
+            center,
+            dot_radius,
+            normal,
+            sums.k_radius,
+            axis,
+            1.0,
+            DOT_CURVATURE,
+            point.pixel,
+            source[query],
+            screen_and_flags,
         );
     }
     // A line has no width to draw.
-    let drawn_ratio = select(1.0, min(face.major_ratio, frame.longest), face.major_ratio < MAX_F32);
+    let drawn_ratio = select(min(face.major_ratio, frame.longest), 1.0, face.is_line);
     // Adaptation needs the full length.
-    let major_ratio = select(drawn_ratio, face.major_ratio, frame.adaptive == 1u && sums.count >= MIN_SCAN_LINE_NEIGHBORS);
+    let major_ratio = select(drawn_ratio, face.major_ratio, frame.scan_lines == 1u && sums.count >= MIN_SCAN_LINE_NEIGHBORS);
     return Surfel(
         center,
         radius,
@@ -180,7 +194,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
         face.curvature,
         point.pixel,
         source[query],
-        query,
+        screen_and_flags,
     );
 }
 
@@ -201,7 +215,7 @@ fn fit(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index)
         let place = task.first + index;
         let fitted = surfel(queries[place], neighborhoods[place]);
         surfels[place] = fitted;
-        if fitted.radius == 0.0 {
+        if is_dropped(fitted) {
             atomicAdd(&outliers, 1u);
         }
     }

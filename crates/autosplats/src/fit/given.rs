@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Surfel, Surfels};
+use super::{FitRules, Surfel, Surfels};
 use crate::camera::View;
 use crate::project::ScreenPoints;
 
@@ -23,8 +23,7 @@ pub(crate) fn place(
     queries: &[u32],
     planes: &GivenPlanes<'_>,
     view: &View,
-    k: u32,
-    splat_scale: f32,
+    rules: &FitRules,
     surfels: &mut Surfels,
 ) {
     surfels.extend(queries.iter().map(|&query| {
@@ -37,16 +36,16 @@ pub(crate) fn place(
         let radius = if is_drawn { planes.radius[source as usize].max(0.0) } else { 0.0 };
         Surfel {
             center: point.position_view,
-            radius: splat_scale * radius,
+            radius: rules.splat_scale * radius,
             normal: normal.to_array(),
             // The radius is 2·√(r_k²/k).
-            k_radius: 0.5 * radius * (k as f32).sqrt(),
+            k_radius: 0.5 * radius * (rules.k as f32).sqrt(),
             major_axis: normal.any_orthonormal_vector().to_array(),
             major_ratio: 1.0,
             curvature: planes.curvature[source as usize],
             pixel: point.pixel,
             source,
-            screen: query,
+            screen_and_flags: query,
         }
     }));
 }

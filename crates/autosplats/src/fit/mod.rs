@@ -37,7 +37,7 @@ pub(crate) const SUPPORT: f32 = 1.4;
 pub(crate) struct Surfel {
     /// The point itself, or the surface fitted to noisy points there, in view space.
     pub(crate) center: [f32; 3],
-    /// Semi-minor axis, world units; 0 if the point was discarded.
+    /// Semi-minor axis, world units; a [dropped](Self::is_dropped) surfel has none.
     pub(crate) radius: f32,
     /// Unit normal towards the eye, view space.
     pub(crate) normal: [f32; 3],
@@ -45,7 +45,7 @@ pub(crate) struct Surfel {
     pub(crate) k_radius: f32,
     /// Unit direction of the semi-major axis, view space, in the disc's plane.
     pub(crate) major_axis: [f32; 3],
-    /// Semi-major over semi-minor axis; 1 for circles.
+    /// Semi-major over semi-minor axis; 1 for circles. Until `adapt` limits it, the ratio of variances of a scan line.
     pub(crate) major_ratio: f32,
     /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
     pub(crate) curvature: f32,
@@ -53,18 +53,43 @@ pub(crate) struct Surfel {
     pub(crate) pixel: u32,
     /// Index in the cloud.
     pub(crate) source: u32,
-    /// Index among the screen points; [`BACK`](Self::BACK) is set if the surface shows its back.
-    pub(crate) screen: u32,
+    /// Index among the screen points, which stays below 2³⁰ with at most two points a pixel, and two flags:
+    /// [`BACK`](Self::BACK) and [`LINE`](Self::LINE).
+    pub(crate) screen_and_flags: u32,
 }
 
 impl Surfel {
-    /// Bit of `screen` that marks a surface's back. Indices of screen points, at most two a pixel, stay below 2³⁰.
+    /// Flag: the eye sees the side that the point's sensor did not see.
     pub(crate) const BACK: u32 = 1 << 31;
+    /// Flag: the neighbourhood is a line, which has no width to draw.
+    pub(crate) const LINE: u32 = 1 << 30;
 
-    /// Whether the eye sees the side that the point's sensor did not see.
+    /// Index among the screen points.
+    #[inline(always)]
+    pub(crate) fn screen(&self) -> u32 {
+        self.screen_and_flags & !(Self::BACK | Self::LINE)
+    }
+
     #[inline(always)]
     pub(crate) fn shows_back(&self) -> bool {
-        self.screen & Self::BACK != 0
+        self.screen_and_flags & Self::BACK != 0
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_line(&self) -> bool {
+        self.screen_and_flags & Self::LINE != 0
+    }
+
+    /// Drops the point: nothing is drawn.
+    #[inline(always)]
+    pub(crate) fn discard(&mut self) {
+        self.radius = 0.0;
+    }
+
+    /// Whether the point is dropped: as an outlier, or because it has no neighbours or all lie at its own place.
+    #[inline(always)]
+    pub(crate) fn is_dropped(&self) -> bool {
+        self.radius == 0.0
     }
 
     /// Column and row of the centre's pixel.

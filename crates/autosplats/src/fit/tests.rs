@@ -13,8 +13,15 @@ use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
 use crate::search::{LANES, NeighborhoodBlock, Neighborhoods};
 use crate::test_clouds::Random;
 
-const RULES: FitRules =
-    FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false, dot_px: 0.0 };
+const RULES: FitRules = FitRules {
+    k: 10,
+    splat_scale: 1.0,
+    longest: LONGEST,
+    scan_lines: false,
+    keep_outliers: false,
+    compares_density: false,
+    dot_px: None,
+};
 
 /// A point and its neighbours, in view space.
 #[derive(Clone, Debug)]
@@ -98,7 +105,7 @@ fn fitted(neighborhoods: &[Neighborhood], view: &View, rules: &FitRules, culling
     }
     let mut surfels = vec![Surfel::default(); 2];
     let queries: Vec<u32> = (0..neighborhoods.len() as u32).collect();
-    fit(&screen, &queries, &moments, view, rules, &mut surfels);
+    fit(&screen, &queries, &moments, view, rules, &mut surfels, &crate::cancel::NEVER);
     assert_eq!(surfels[..2], [Surfel::default(); 2], "surfels from before are kept");
     surfels.split_off(2)
 }
@@ -268,7 +275,12 @@ fn kept(k: u32, sparser: f64, count: usize, mut offsets: impl FnMut(&mut Random)
         Neighborhood { offsets: n.offsets.iter().map(|offset| offset * scale).collect(), ..n }
     };
     let neighborhoods: Vec<_> = (0..count).map(|_| one()).collect();
-    let surfels = fitted(&neighborhoods, &view, &FitRules { k, adaptive: true, ..RULES }, f32::INFINITY);
+    let surfels = fitted(
+        &neighborhoods,
+        &view,
+        &FitRules { k, scan_lines: true, compares_density: true, ..RULES },
+        f32::INFINITY,
+    );
     surfels.iter().filter(|surfel| surfel.radius > 0.0).count() as f64 / count as f64
 }
 

@@ -18,8 +18,8 @@ pub(crate) struct FrameUniform {
     pub(crate) k: u32,
     pub(crate) halves: u32,
     pub(crate) grid_culling: u32,
-    /// 1 if the adapt stage runs.
-    pub(crate) adaptive: u32,
+    /// 1 if the search is lenient towards gaps after one neighbour and towards outliers.
+    pub(crate) lenient: u32,
     pub(crate) keep_outliers: u32,
     pub(crate) splat_scale: f32,
     /// Radius within which a point must have a neighbour, in first search radii.
@@ -45,8 +45,12 @@ pub(crate) struct FrameUniform {
     pub(crate) past_focal_px: f32,
     /// Radius in pixels if all points are drawn as dots; 0 if they form a surface.
     pub(crate) dot_px: f32,
+    /// 1 if surfels on scan lines keep their full length.
+    pub(crate) scan_lines: u32,
+    /// 1 if outliers are held against the density around them.
+    pub(crate) compares_density: u32,
     /// Padding to sixteen bytes, which WGSL adds implicitly.
-    pub(crate) padding: [u32; 3],
+    pub(crate) padding: u32,
 }
 
 impl FrameUniform {
@@ -62,7 +66,7 @@ impl FrameUniform {
             k,
             halves: 0,
             grid_culling: 0,
-            adaptive: 0,
+            lenient: 0,
             keep_outliers: 0,
             splat_scale: 1.0,
             outlier_growth: f32::INFINITY,
@@ -78,7 +82,9 @@ impl FrameUniform {
             past_shift: [0.0; 3],
             past_focal_px: 0.0,
             dot_px: 0.0,
-            padding: [0; 3],
+            scan_lines: 0,
+            compares_density: 0,
+            padding: 0,
         }
     }
 

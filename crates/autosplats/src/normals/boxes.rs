@@ -1,11 +1,25 @@
-//! Axis-aligned boxes, single and in groups of sixteen, and the distances between them.
+//! Axis-aligned boxes of points, single and in groups of sixteen, and the distances between them.
 
 use pulp::Simd;
 
-use super::tree::Point;
 use crate::search::select::vectors;
 use crate::search::{LANES, Lanes};
 use crate::simd::F32s;
+
+/// A finite point of the cloud: its position, and the bits of its index as a fourth number.
+#[derive(Clone, Copy, Debug)]
+#[repr(transparent)]
+pub(super) struct Point(pub(super) [f32; 4]);
+
+impl Point {
+    pub(super) fn new([x, y, z]: [f32; 3], index: u32) -> Self {
+        Self([x, y, z, f32::from_bits(index)])
+    }
+
+    pub(super) fn index(&self) -> u32 {
+        self.0[3].to_bits()
+    }
+}
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]

@@ -34,11 +34,12 @@ use autosplats_cloud::{PointCloud, Progress};
 use pulp::Simd;
 use rayon::prelude::*;
 
+use self::boxes::Point;
 use self::neighbors::{Scratch, search_leaf};
 use self::orient::Sides;
 use self::output::Output;
 use self::ticker::Ticker;
-use self::tree::{Point, Tree};
+use self::tree::Tree;
 use crate::Error;
 use crate::fit::Fitted;
 use crate::search::LANES;

@@ -11,27 +11,12 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use pulp::Simd;
 use rayon::prelude::*;
 
-use super::boxes::{Bounds, Boxes, squared_distances};
+use super::boxes::{Bounds, Boxes, Point, squared_distances};
 use crate::Error;
 use crate::search::{LANES, Lanes};
 
 /// Nodes with no more leaves than this are built by one thread.
 const TASK_LEAVES: usize = 256;
-
-/// A finite point of the cloud: its position, and the bits of its index as a fourth number.
-#[derive(Clone, Copy, Debug)]
-#[repr(transparent)]
-pub(super) struct Point(pub(super) [f32; 4]);
-
-impl Point {
-    pub(super) fn new([x, y, z]: [f32; 3], index: u32) -> Self {
-        Self([x, y, z, f32::from_bits(index)])
-    }
-
-    fn index(&self) -> u32 {
-        self.0[3].to_bits()
-    }
-}
 
 /// Sixteen points that lie close together, in lanes for SIMD.
 #[derive(Clone, Copy, Debug)]

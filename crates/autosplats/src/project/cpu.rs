@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::sixteenths::{Sixteenths, half, sixteenth, sixteenths_at};
 use super::{Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints};
 use crate::camera::View;
+use crate::cancel::Cancel;
 
 /// Points projected per task.
 const TASK_POINTS: usize = 16 * 1024;
@@ -37,11 +38,22 @@ pub(crate) struct Projector {
 }
 
 impl Projector {
+    /// The screen points of the last projection.
+    pub(crate) fn screen(&self) -> &ScreenPoints {
+        &self.screen
+    }
+
     /// Projects `cloud`, which has fewer than 2³² points, for `view`.
-    pub(crate) fn project(&mut self, cloud: &PointCloud, view: &View, rules: &ProjectRules) -> &ScreenPoints {
+    pub(crate) fn project(
+        &mut self,
+        cloud: &PointCloud,
+        view: &View,
+        rules: &ProjectRules,
+        cancel: &Cancel<'_>,
+    ) -> &ScreenPoints {
         let ProjectRules { k, halves, .. } = *rules;
         let Self { keys, screen } = self;
-        screen.dropped = nearest_per_pixel(cloud.positions(), view, halves, keys, &mut screen.sixteenths);
+        screen.dropped = nearest_per_pixel(cloud.positions(), view, halves, keys, &mut screen.sixteenths, cancel);
         let keys = Keys::settle(keys, view, halves);
         let spacing_px = keys.mean_spacing();
         compact(cloud.positions(), view, &keys, spacing_px, screen);
@@ -122,6 +134,7 @@ fn nearest_per_pixel(
     halves: bool,
     keys: &mut Vec<AtomicU64>,
     sixteenths: &mut Sixteenths,
+    cancel: &Cancel<'_>,
 ) -> Dropped {
     let pixels = view.width as usize * view.height as usize;
     keys.resize_with(pixels << u32::from(halves), AtomicU64::default);
@@ -131,6 +144,9 @@ fn nearest_per_pixel(
     let sixteenths = &*sixteenths;
     let [not_finite, behind, outside] = [(); 3].map(|()| AtomicUsize::new(0));
     positions.par_chunks(TASK_POINTS).enumerate().for_each(|(chunk, positions)| {
+        if cancel.is_given_up() {
+            return;
+        }
         let first = (chunk * TASK_POINTS) as u32;
         let dropped = project_chunk(positions, first, view, halves, keys, sixteenths);
         not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);

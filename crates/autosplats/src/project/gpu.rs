@@ -1,5 +1,6 @@
 //! Projection on the GPU: the steps of the CPU form, one pass each.
 
+pub(crate) use super::Round;
 use super::cpu::{MAX_SECOND_DEPTH_PX, STRIP_SPACINGS};
 use super::device_cloud::{Chunk, DeviceCloud};
 use super::{MARGIN_REACH, ScreenPoint};
@@ -40,15 +41,6 @@ pub(crate) enum Work {
     LeftRecovered64,
     ActiveFew,
     RecoveredFew,
-}
-
-/// Set of queries that the search, the fit and the splatting process.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Round {
-    /// The passive points that proved visible.
-    Active,
-    /// The passive points that turned out not to be hidden.
-    Recovered,
 }
 
 impl Round {

@@ -39,6 +39,15 @@ use crate::camera::View;
 // Differs from the paper: the paper's points end with the picture.
 pub(crate) const MARGIN_REACH: f32 = 1.5;
 
+/// A set of screen points that search, fit, adapt and splatting process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Round {
+    /// The active points.
+    Active,
+    /// The passive points that turned out not to be hidden.
+    Recovered,
+}
+
 /// Settings of the projection.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ProjectRules {

@@ -193,7 +193,7 @@ fn every_cloud_at_every_size() {
                 let view = camera.view(DVec3::ZERO, size).expect("a view");
                 for halves in [false, true] {
                     let rules = ProjectRules { halves, ..ProjectRules::usual(10) };
-                    let screen = projector.project(&cloud(&positions), &view, &rules);
+                    let screen = projector.project(&cloud(&positions), &view, &rules, &crate::cancel::NEVER);
                     let outcome = compare(screen, &oracle(&camera, size, &positions, halves), &camera, size);
                     assert_eq!(outcome, Ok(()), "{name}, {size:?}, {:?}, {halves}", camera.projection);
                 }
@@ -228,7 +228,7 @@ fn comparison_sees_each_kind_of_error() {
         ("wrong list", |s| s.passive.extend(s.active.pop())),
     ];
     let mut projector = Projector::default();
-    let right = projector.project(&cloud(&positions), &view, &ProjectRules::usual(10));
+    let right = projector.project(&cloud(&positions), &view, &ProjectRules::usual(10), &crate::cancel::NEVER);
     assert_eq!(compare(right, &oracle, &camera, size), Ok(()), "nothing is wrong yet");
     for (name, spoil) in errors {
         let mut wrong = right.clone();
@@ -278,7 +278,7 @@ fn each_drop_is_counted_for_its_reason() {
         for (camera, expected) in [(perspective, in_perspective), (parallel, in_parallel)] {
             let view = camera.view(DVec3::ZERO, [8, 8]).expect("a view");
             let mut projector = Projector::default();
-            let screen = projector.project(&cloud(&[position]), &view, &ProjectRules::usual(10));
+            let screen = projector.project(&cloud(&[position]), &view, &ProjectRules::usual(10), &crate::cancel::NEVER);
             assert_eq!(screen.dropped, expected, "{name}, {:?}", camera.projection);
             assert_eq!(screen.points.len(), usize::from(expected == visible), "{name}: number of screen points");
         }
@@ -304,8 +304,8 @@ fn poison_harms_nobody() {
         mixed.extend(&healthy);
         random.shuffle(&mut mixed);
         let (mut clean, mut mixed_projector) = (Projector::default(), Projector::default());
-        let clean = clean.project(&cloud(&healthy), &view, &ProjectRules::usual(10));
-        let screen = mixed_projector.project(&cloud(&mixed), &view, &ProjectRules::usual(10));
+        let clean = clean.project(&cloud(&healthy), &view, &ProjectRules::usual(10), &crate::cancel::NEVER);
+        let screen = mixed_projector.project(&cloud(&mixed), &view, &ProjectRules::usual(10), &crate::cancel::NEVER);
         let near = screen.points.iter().filter(|point| point.position_view[2] < 100.0);
         let by_pixel = |point: &&ScreenPoint| point.pixel;
         let mut near: Vec<_> = near.collect();
@@ -326,8 +326,8 @@ fn order_of_points_does_not_matter() {
             let mut shuffled = positions.clone();
             Random::new(12).shuffle(&mut shuffled);
             let (mut first, mut second) = (Projector::default(), Projector::default());
-            let first = first.project(&cloud(&positions), &view, &ProjectRules::usual(10));
-            let second = second.project(&cloud(&shuffled), &view, &ProjectRules::usual(10));
+            let first = first.project(&cloud(&positions), &view, &ProjectRules::usual(10), &crate::cancel::NEVER);
+            let second = second.project(&cloud(&shuffled), &view, &ProjectRules::usual(10), &crate::cancel::NEVER);
             assert_eq!(first.points, second.points, "{name}: screen points");
             assert_eq!(first.cells.start, second.cells.start, "{name}: cells");
             let places = |screen: &ScreenPoints, cloud: &[[f32; 3]]| -> Positions {
@@ -345,7 +345,7 @@ fn equal_points_go_to_the_lower_index() {
     let mut positions = vec![[0.5, 0.0, 3.0]; 40_000];
     positions[..100].fill([0.5, 0.0, 4.0]);
     let mut projector = Projector::default();
-    let screen = projector.project(&cloud(&positions), &view, &ProjectRules::usual(10));
+    let screen = projector.project(&cloud(&positions), &view, &ProjectRules::usual(10), &crate::cancel::NEVER);
     assert_eq!(screen.source, [100], "the first of the nearest");
 }
 
@@ -357,7 +357,8 @@ fn halves_keep_a_point_each_of_one_surface() {
     // A pixel is 1 wide. The pixel right of and below the centre is split top/bottom, the next left/right.
     let kept = |positions: &[[f32; 3]]| -> Vec<u32> {
         let mut projector = Projector::default();
-        let mut source = projector.project(&cloud(positions), &view, &ProjectRules::usual(10)).source.clone();
+        let mut source =
+            projector.project(&cloud(positions), &view, &ProjectRules::usual(10), &crate::cancel::NEVER).source.clone();
         source.sort_unstable();
         source
     };
@@ -384,10 +385,10 @@ fn a_margin_adds_neighbours_and_few_queries() {
     for grid_culling in [true, false] {
         let rules = ProjectRules { k: 10, halves: true, grid_culling };
         let picture = camera.view(DVec3::ZERO, SIZE).expect("a view");
-        let alone = Projector::default().project(&cloud, &picture, &rules).clone();
+        let alone = Projector::default().project(&cloud, &picture, &rules, &crate::cancel::NEVER).clone();
         let view = picture.with_margin(MARGIN as u32);
         let mut projector = Projector::default();
-        let screen = projector.project(&cloud, &view, &rules);
+        let screen = projector.project(&cloud, &view, &rules, &crate::cancel::NEVER);
         let beside_px = |&index: &u32| view.beside_picture(screen.points[index as usize].pixel_xy());
         let all: Vec<u32> = (0..screen.points.len() as u32).collect();
         let mut seen: Vec<u32> =
@@ -416,7 +417,7 @@ fn density_cells_hold_about_k_points() {
     let positions: Positions = test_clouds::plane(5000).iter().map(|&[x, y, _]| [x, y, 2.0]).collect();
     for k in [4, 10, 64] {
         let mut projector = Projector::default();
-        let screen = projector.project(&cloud(&positions), &view, &ProjectRules::usual(k));
+        let screen = projector.project(&cloud(&positions), &view, &ProjectRules::usual(k), &crate::cancel::NEVER);
         let area = (screen.density.cell_px * screen.density.cell_px) as f32;
         let mean = screen.points.len() as f32 / (200.0 * 200.0) * area;
         // Cells have a whole number of pixels.

@@ -1,6 +1,5 @@
 //! Frames on the CPU.
 
-use std::borrow::Cow;
 use std::time::Instant;
 
 use autosplats_cloud::PointCloud;
@@ -8,23 +7,26 @@ use rayon::prelude::*;
 
 use super::attributes::SplatAttributes;
 use super::exposure::Exposure;
+use super::frame::Stage;
+use super::rules::{Mode, Rules};
 use super::surfels::point_surfels;
 use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check};
 use crate::Error;
-use crate::adapt::{AdaptRules, Adapter, DepthNoise, Noise};
+use crate::adapt::{Adapter, DepthNoise, Noise};
 use crate::camera::{Camera, PlacedView, View};
+use crate::cancel::Cancel;
 use crate::fit::orient::Sensors;
-use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
-use crate::project::{ProjectRules, Projector, ScreenPoints};
+use crate::fit::{GivenPlanes, Surfels, fit, place};
+use crate::project::{Projector, Round, ScreenPoints};
 use crate::search::past::Past;
-use crate::search::{Neighborhoods, SearchCounts, SearchEngine, SearchRules, screen_grid};
+use crate::search::{Neighborhoods, SearchCounts, SearchEngine, screen_grid};
 use crate::shade::over_time::LastPicture;
 use crate::shade::{Image, Scene, linear_steps, shade};
 use crate::splat::{Attributes, OverTime, PointColors, Splatter};
 
-/// Renders on the CPU, in the current rayon thread pool.
-#[derive(Debug)]
+/// Renders on the CPU, in the current rayon thread pool. Keeps its buffers from frame to frame.
+#[derive(Debug, Default)]
 pub(super) struct CpuRenderer {
     projector: Projector,
     past: Past,
@@ -33,44 +35,20 @@ pub(super) struct CpuRenderer {
     adapter: Adapter,
     /// Identity of the cloud that `sensors` and `depth_noise` belong to.
     cloud_identity: Option<u64>,
-    sensors: Sensors,
-    upward: Upward,
-    exposure: Exposure,
+    /// `None` until surfels of the cloud are oriented.
+    sensors: Option<Sensors>,
     /// Noise of the cloud's depth cameras; `None` until a frame of the cloud is adapted.
     depth_noise: Option<DepthNoise>,
-    /// Passive points that the first pass left visible.
+    upward: Upward,
+    exposure: Exposure,
+    /// Passive points that the first round left visible.
     recovered: Vec<u32>,
     splatter: Splatter,
     image: Image,
-    linear: [f32; 256],
     /// View of the last frame; `None` if there is none or it was cancelled.
     view: Option<View>,
     over_time: OverTime<Reconstruction>,
     last_picture: LastPicture<Settings>,
-}
-
-impl Default for CpuRenderer {
-    fn default() -> Self {
-        Self {
-            projector: Projector::default(),
-            past: Past::default(),
-            neighborhoods: Neighborhoods::default(),
-            surfels: Surfels::default(),
-            adapter: Adapter::default(),
-            cloud_identity: None,
-            sensors: Sensors::default(),
-            upward: Upward::default(),
-            exposure: Exposure::default(),
-            depth_noise: None,
-            recovered: Vec::new(),
-            splatter: Splatter::default(),
-            image: Image::default(),
-            linear: linear_steps(),
-            view: None,
-            over_time: OverTime::default(),
-            last_picture: LastPicture::default(),
-        }
-    }
 }
 
 /// Checks that the engine runs on the CPU.
@@ -100,135 +78,242 @@ impl CpuRenderer {
         size: [u32; 2],
         settings: &Settings,
         given: Option<GivenPlanes<'_>>,
-        go_on: &dyn Fn() -> bool,
+        go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let picture = check(cloud, camera, size, settings)?;
-        let (settings, dot_px) = match given {
-            Some(_) => (Cow::Borrowed(settings), 0.0),
-            None => settings.for_cloud(cloud, size),
+        let mode = match given {
+            Some(_) => Mode::Given,
+            None => {
+                check_engine(settings.reconstruction.engine)?;
+                Mode::of(&settings.reconstruction, cloud, size)
+            }
         };
-        let settings = &*settings;
-        let margin = if given.is_none() { settings.reconstruction.margin(size) } else { 0 };
-        let view = picture.with_margin(margin);
-        if given.is_none() {
-            check_engine(settings.reconstruction.engine)?;
-        }
+        let rules = Rules::new(&settings.reconstruction, mode, size, |_, _| true);
         let wanted = SplatAttributes::new(cloud, settings)?;
-        // From here on, only cancelling stops the frame; then there are no surfels.
-        self.view = None;
-        let colors = wanted.colors(cloud);
+        let (colors, linear) = (wanted.colors(cloud), linear_steps());
         let attributes = Attributes {
-            color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &self.linear }),
+            color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &linear }),
             scalar: wanted.scalar(cloud),
             measures: wanted.measures,
             backs: wanted.backs,
         };
-        let settings_splat = &settings.reconstruction;
-        let Self {
-            projector,
-            past,
-            neighborhoods,
-            surfels,
-            adapter,
-            cloud_identity,
-            sensors,
-            upward,
-            exposure,
-            depth_noise,
-            recovered,
-            splatter,
-            image,
-            view: last_view,
-            over_time,
-            last_picture,
-            ..
-        } = self;
-        let mut clock = Clock::start(go_on);
-        if cloud_identity.replace(cloud.identity()) != Some(cloud.identity()) {
-            *sensors = Sensors::new(cloud);
-            *depth_noise = None;
-            clock.lap(|timings| &mut timings.fit)?;
-        }
-
-        let rules = ProjectRules {
-            k: settings_splat.k,
-            halves: settings_splat.halves(),
-            grid_culling: settings_splat.grid_culling,
+        let cancel = Cancel::new(go_on);
+        let mut frame = CpuFrame {
+            renderer: self,
+            cloud,
+            settings,
+            rules: &rules,
+            given,
+            attributes,
+            cancel: &cancel,
+            picture,
+            view: picture.with_margin(rules.margin_px),
+            search_counts: SearchCounts::default(),
+            covered: 0,
+            value_range: None,
         };
-        let screen = projector.project(cloud, &view, &rules);
-        clock.lap(|timings| &mut timings.project)?;
+        let begin = Instant::now();
+        let mut timings = Timings::default();
+        frame.begin();
+        timings.splat = milliseconds_since(begin);
+        for stage in Stage::list(&rules) {
+            let start = Instant::now();
+            frame.run(stage);
+            *stage.time(&mut timings) += milliseconds_since(start);
+            cancel.check()?;
+        }
+        timings.frame = milliseconds_since(begin);
+        let counts = frame.end();
+        Ok(Frame { image: &self.image, layers: self.splatter.last(), counts, timings, passes: &[] })
+    }
+}
 
-        if settings_splat.adaptive && given.is_none() {
-            depth_noise.get_or_insert_with(|| DepthNoise::new(cloud));
-            adapter.begin(screen, &view, settings_splat.k);
-            clock.lap(|timings| &mut timings.adapt)?;
+/// A frame in progress.
+struct CpuFrame<'a> {
+    /// The renderer, whose buffers the stages fill.
+    renderer: &'a mut CpuRenderer,
+    cloud: &'a PointCloud,
+    settings: &'a Settings,
+    rules: &'a Rules,
+    given: Option<GivenPlanes<'a>>,
+    attributes: Attributes<'a>,
+    cancel: &'a Cancel<'a>,
+    /// View of the picture, without the margin.
+    picture: View,
+    /// View of the screen.
+    view: View,
+    search_counts: SearchCounts,
+    /// Pixels that show a surface.
+    covered: usize,
+    value_range: Option<[f64; 2]>,
+}
+
+impl CpuFrame<'_> {
+    /// A view of the cloud, for later frames to look back to.
+    fn placed(&self, view: View) -> PlacedView {
+        PlacedView { view, origin: self.cloud.origin() }
+    }
+
+    /// Takes leave of the last frame. From here on, only cancelling stops the frame; then there are no surfels.
+    fn begin(&mut self) {
+        let [now, picture] = [self.view, self.picture].map(|view| self.placed(view));
+        let Self { renderer, settings, rules, .. } = self;
+        let identity = self.cloud.identity();
+        renderer.view = None;
+        if renderer.cloud_identity.replace(identity) != Some(identity) {
+            renderer.sensors = None;
+            renderer.depth_noise = None;
         }
-        let now = PlacedView { view, origin: cloud.origin() };
-        if settings_splat.starts_from_past() && given.is_none() {
-            past.begin(now, settings_splat.k);
+        renderer.surfels.clear();
+        renderer.splatter.begin(&now.view);
+        if rules.coherent {
+            renderer.past.begin(now, rules.project.k);
         } else {
-            past.forget();
+            renderer.past.forget();
         }
-        clock.lap(|timings| &mut timings.search)?;
-        surfels.clear();
-        splatter.begin(&view);
-        let nothing = DepthNoise::default();
-        let depth_noise = depth_noise.as_ref().unwrap_or(&nothing);
-        let smooths = settings_splat.smooths() && given.is_none();
-        if smooths {
-            over_time.begin(now, cloud.identity(), settings_splat, settings_splat.averaged());
+        if let Some(averaged) = rules.averaged {
+            renderer.over_time.begin(now, identity, &settings.reconstruction, averaged);
+            renderer.last_picture.begin(picture, identity, settings);
         } else {
-            over_time.forget();
-            last_picture.forget();
+            renderer.over_time.forget();
+            renderer.last_picture.forget();
         }
-        let seen = PlacedView { view: picture, origin: cloud.origin() };
-        let following = smooths.then(|| last_picture.begin(seen, cloud.identity(), settings));
-        let reconstruct = Reconstruct { screen, view: &view, dot_px, settings, past, sensors, depth_noise, given };
-        let mut buffers = Buffers { neighborhoods, surfels, adapter, over_time, splatter };
-        let mut search_counts = reconstruct.run(&screen.active, &mut buffers, &mut clock)?;
-        recovered.clear();
-        let hidden = |index: u32| {
+    }
+
+    fn run(&mut self, stage: Stage) {
+        match stage {
+            Stage::Project => self.project(),
+            Stage::FillCells => self.fill_cells(),
+            Stage::Search(round) => self.search(round),
+            Stage::Fit(round) => self.fit(round),
+            Stage::Adapt(round) => self.adapt(round),
+            Stage::Orient(round) => self.orient(round),
+            Stage::Average(round) => self.average(round),
+            Stage::Draw(round) => self.draw(round),
+            Stage::Recover => self.recover(),
+            Stage::Keep => self.keep(),
+            Stage::Layers => self.layers(),
+            Stage::Shade => self.shade(),
+        }
+    }
+
+    fn project(&mut self) {
+        self.renderer.projector.project(self.cloud, &self.view, &self.rules.project, self.cancel);
+    }
+
+    fn fill_cells(&mut self) {
+        let CpuRenderer { projector, adapter, depth_noise, .. } = &mut *self.renderer;
+        depth_noise.get_or_insert_with(|| DepthNoise::new(self.cloud));
+        adapter.begin(projector.screen(), &self.view, self.rules.project.k, self.cancel);
+    }
+
+    fn search(&mut self, round: Round) {
+        let CpuRenderer { projector, past, neighborhoods, recovered, .. } = &mut *self.renderer;
+        let screen = projector.screen();
+        let queries = queries(screen, recovered, round);
+        if let Some(rules) = &self.rules.search {
+            screen_grid::search(screen, queries, &self.view, rules, past, neighborhoods, self.cancel);
+            self.search_counts = self.search_counts + neighborhoods.counts;
+            past.keep(screen, queries, neighborhoods);
+        }
+    }
+
+    fn fit(&mut self, round: Round) {
+        let CpuRenderer { projector, neighborhoods, recovered, surfels, .. } = &mut *self.renderer;
+        let screen = projector.screen();
+        let queries = queries(screen, recovered, round);
+        match &self.given {
+            Some(planes) => place(screen, queries, planes, &self.view, &self.rules.fit, surfels),
+            None => fit(screen, queries, neighborhoods, &self.view, &self.rules.fit, surfels, self.cancel),
+        }
+    }
+
+    fn adapt(&mut self, round: Round) {
+        let CpuRenderer { projector, adapter, depth_noise, surfels, .. } = &mut *self.renderer;
+        let screen = projector.screen();
+        if let (Some(rules), Some(known)) = (&self.rules.adapt, depth_noise) {
+            let surfels = &mut surfels[first(screen, round)..];
+            adapter.adapt(surfels, &screen.density, &self.view, rules, known, self.cancel);
+        }
+    }
+
+    fn orient(&mut self, round: Round) {
+        let CpuRenderer { projector, sensors, surfels, .. } = &mut *self.renderer;
+        let sensors = sensors.get_or_insert_with(|| Sensors::new(self.cloud));
+        sensors.orient(&mut surfels[first(projector.screen(), round)..], &self.view);
+    }
+
+    fn average(&mut self, round: Round) {
+        let CpuRenderer { projector, over_time, splatter, surfels, .. } = &mut *self.renderer;
+        let screen = projector.screen();
+        over_time.smooth(&mut surfels[first(screen, round)..], screen, splatter.last(), &self.view);
+    }
+
+    fn draw(&mut self, round: Round) {
+        let CpuRenderer { projector, splatter, surfels, .. } = &mut *self.renderer;
+        splatter.add(surfels, first(projector.screen(), round), &self.view, self.cancel);
+    }
+
+    fn recover(&mut self) {
+        let CpuRenderer { projector, splatter, recovered, .. } = &mut *self.renderer;
+        let (screen, view, k) = (projector.screen(), &self.view, self.rules.project.k);
+        let is_recovered = |&index: &u32| {
             let point = &screen.points[index as usize];
-            let radius_px = screen.density.initial_radius_px(point, settings_splat.k);
-            buffers.splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, &view)
+            let radius_px = screen.density.initial_radius_px(point, k);
+            screen.density.matters(point, k, view)
+                && !splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, view)
         };
-        let matters = |index: u32| screen.density.matters(&screen.points[index as usize], settings_splat.k, &view);
-        recovered.par_extend(screen.passive.par_iter().copied().filter(|&index| matters(index) && !hidden(index)));
-        clock.lap(|timings| &mut timings.splat)?;
-        if !recovered.is_empty() {
-            search_counts = search_counts + reconstruct.run(recovered, &mut buffers, &mut clock)?;
-        }
+        recovered.clear();
+        recovered.par_extend(screen.passive.par_iter().copied().filter(is_recovered));
+    }
 
-        let Buffers { surfels, adapter, over_time, splatter, .. } = buffers;
-        if settings_splat.depth_refinement {
-            splatter.refine(surfels, &view);
-            splatter.refine(surfels, &view);
+    /// Keeps surfels for the next frame. The k-radii are kept as each round's search ends.
+    fn keep(&mut self) {
+        let CpuRenderer { projector, over_time, surfels, .. } = &mut *self.renderer;
+        if self.rules.averaged.is_some() {
+            over_time.keep(surfels, projector.screen(), &self.view);
         }
-        splatter.attributes(surfels, &view, &attributes);
-        let adapts = settings_splat.adaptive && given.is_none();
-        let noise = if adapts { adapter.noise() } else { Noise::NONE };
-        let (layers, covered) = if settings_splat.trim {
-            splatter.trim(&view, &screen.sixteenths, (noise, settings_splat.k_radius_per_radius()))
-        } else {
-            splatter.whole()
+    }
+
+    fn layers(&mut self) {
+        let CpuRenderer { projector, adapter, splatter, surfels, .. } = &mut *self.renderer;
+        let Self { rules, view, .. } = self;
+        if rules.depth_refinement {
+            splatter.refine(surfels, view, self.cancel);
+            splatter.refine(surfels, view, self.cancel);
+        }
+        splatter.attributes(surfels, view, &self.attributes, self.cancel);
+        self.covered = match &rules.trim {
+            Some(trim) => {
+                let noise = if rules.adapt.is_some() { adapter.noise() } else { Noise::NONE };
+                splatter.trim(view, &projector.screen().sixteenths, noise, trim, self.cancel)
+            }
+            None => splatter.covered(),
         };
-        if smooths {
-            over_time.end(now, cloud.identity(), settings_splat.clone(), surfels, screen);
-        }
-        clock.lap(|timings| &mut timings.splat)?;
+    }
 
-        let exposure = exposure.of(cloud, &settings.shading);
-        let scene = Scene { view: &picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
-        let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, following, image);
-        if smooths {
-            last_picture.end(seen, cloud.identity(), settings.clone());
-        }
-        clock.lap(|timings| &mut timings.shade)?;
-        *last_view = Some(view);
-        past.end();
+    fn shade(&mut self) {
+        let CpuRenderer { upward, exposure, splatter, image, last_picture, .. } = &mut *self.renderer;
+        let Self { cloud, settings: Settings { shading, all_layers, .. }, .. } = self;
+        let exposure = exposure.of(cloud, shading);
+        let scene = Scene { view: &self.picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
+        let following = self.rules.averaged.map(|_| last_picture.following(self.picture));
+        self.value_range = shade(splatter.last(), &scene, shading, *all_layers, following, image, self.cancel);
+    }
 
+    /// Makes the frame the last one.
+    fn end(self) -> Counts {
+        let [now, picture] = [self.view, self.picture].map(|view| self.placed(view));
+        let Self { renderer, cloud, settings, rules, search_counts, covered, value_range, .. } = self;
+        renderer.view = Some(now.view);
+        renderer.past.end();
+        if rules.averaged.is_some() {
+            renderer.over_time.end(now, cloud.identity(), settings.reconstruction.clone());
+            renderer.last_picture.end(picture, cloud.identity(), settings.clone());
+        }
+        let screen = renderer.projector.screen();
         let dropped = screen.dropped;
-        let counts = Counts {
+        Counts {
             points: cloud.len(),
             dropped: dropped.not_finite + dropped.behind + dropped.outside,
             not_finite: dropped.not_finite,
@@ -237,128 +322,32 @@ impl CpuRenderer {
             visible: screen.points.len(),
             active: screen.active.len(),
             passive: screen.passive.len(),
-            recovered: recovered.len(),
-            outliers: surfels.iter().filter(|surfel| surfel.radius == 0.0).count(),
+            recovered: renderer.recovered.len(),
+            outliers: renderer.surfels.iter().filter(|surfel| surfel.is_dropped()).count(),
             clamped: search_counts.clamped,
             bounded: search_counts.bounded,
             covered,
             value_range,
-        };
-        Ok(Frame { image, layers, counts, timings: clock.finish(), passes: &[] })
-    }
-}
-
-/// Buffers of the stages, kept from frame to frame.
-struct Buffers<'a> {
-    neighborhoods: &'a mut Neighborhoods,
-    surfels: &'a mut Surfels,
-    adapter: &'a mut Adapter,
-    over_time: &'a mut OverTime<Reconstruction>,
-    splatter: &'a mut Splatter,
-}
-
-/// Reconstruction of a frame: from screen points to splats in the depth map.
-struct Reconstruct<'a> {
-    screen: &'a ScreenPoints,
-    view: &'a View,
-    /// Radius in pixels of the dots that all points are; 0 if they are drawn as a surface.
-    dot_px: f32,
-    settings: &'a Settings,
-    past: &'a Past,
-    sensors: &'a Sensors,
-    depth_noise: &'a DepthNoise,
-    given: Option<GivenPlanes<'a>>,
-}
-
-impl Reconstruct<'_> {
-    /// Searches, fits, adapts and draws the depth of `queries`, and appends their surfels to `surfels`.
-    fn run(
-        &self,
-        queries: &[u32],
-        Buffers { neighborhoods, surfels, adapter, over_time, splatter }: &mut Buffers<'_>,
-        clock: &mut Clock<'_>,
-    ) -> Result<SearchCounts, Error> {
-        let Self { screen, view, dot_px, settings, past, sensors, depth_noise, given } = *self;
-        let settings = &settings.reconstruction;
-        let first = surfels.len();
-        if let Some(planes) = given {
-            place(screen, queries, &planes, view, settings.k, settings.splat_scale, surfels);
-            clock.lap(|timings| &mut timings.fit)?;
-            splatter.add(surfels, first, view);
-            clock.lap(|timings| &mut timings.splat)?;
-            return Ok(SearchCounts::default());
         }
-        let rules = SearchRules {
-            k: settings.k,
-            outlier_expansions: settings.outlier_expansions,
-            gap_factor: settings.gap_factor,
-            adaptive: settings.adaptive,
-        };
-        match settings.engine {
-            SearchEngine::ScreenGrid => screen_grid::search(screen, queries, view, &rules, past, neighborhoods),
-            SearchEngine::SplatCommunication | SearchEngine::KdTree { .. } => {
-                unreachable!("refused before the frame begins")
-            }
-        }
-        past.keep(screen, queries, neighborhoods);
-        clock.lap(|timings| &mut timings.search)?;
-
-        let rules = FitRules {
-            k: settings.k,
-            splat_scale: settings.splat_scale,
-            // The adapt stage depends on the shape of ellipses.
-            longest: settings.longest(),
-            adaptive: settings.adaptive,
-            keep_outliers: settings.outlier_expansions.is_none(),
-            dot_px,
-        };
-        fit(screen, queries, neighborhoods, view, &rules, surfels);
-        clock.lap(|timings| &mut timings.fit)?;
-
-        if settings.adaptive {
-            let rules = AdaptRules { k: settings.k, longest: settings.longest(), keep_outliers: rules.keep_outliers };
-            adapter.adapt(&mut surfels[first..], &screen.density, view, &rules, depth_noise);
-            clock.lap(|timings| &mut timings.adapt)?;
-        }
-        sensors.orient(&mut surfels[first..], view);
-        clock.lap(|timings| &mut timings.fit)?;
-
-        if settings.smooths() {
-            over_time.smooth(&mut surfels[first..], screen, splatter.last(), view);
-        }
-        splatter.add(surfels, first, view);
-        clock.lap(|timings| &mut timings.splat)?;
-        Ok(neighborhoods.counts)
     }
 }
 
-/// Sums up the time of each stage, and asks whether to go on.
-struct Clock<'a> {
-    go_on: &'a dyn Fn() -> bool,
-    begin: Instant,
-    last: Instant,
-    timings: Timings,
+/// The screen points of a round.
+fn queries<'a>(screen: &'a ScreenPoints, recovered: &'a [u32], round: Round) -> &'a [u32] {
+    match round {
+        Round::Active => &screen.active,
+        Round::Recovered => recovered,
+    }
 }
 
-impl<'a> Clock<'a> {
-    fn start(go_on: &'a dyn Fn() -> bool) -> Self {
-        let now = Instant::now();
-        Self { go_on, begin: now, last: now, timings: Timings::default() }
+/// Index of the first surfel of a round; those of the active points come first.
+fn first(screen: &ScreenPoints, round: Round) -> usize {
+    match round {
+        Round::Active => 0,
+        Round::Recovered => screen.active.len(),
     }
+}
 
-    /// Adds the time since the last lap to a stage.
-    ///
-    /// # Errors
-    /// [`Error::Cancelled`] if `go_on` returns false.
-    fn lap(&mut self, stage: impl Fn(&mut Timings) -> &mut f64) -> Result<(), Error> {
-        let now = Instant::now();
-        *stage(&mut self.timings) += (now - self.last).as_secs_f64() * 1e3;
-        self.last = now;
-        if (self.go_on)() { Ok(()) } else { Err(Error::Cancelled) }
-    }
-
-    fn finish(mut self) -> Timings {
-        self.timings.frame = (self.last - self.begin).as_secs_f64() * 1e3;
-        self.timings
-    }
+fn milliseconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
 }

@@ -11,6 +11,7 @@ use autosplats_cloud::PointCloud;
 use self::prepared::{Passes, Prepared, ResidentBuffers, Shape};
 use super::attributes::{ColorSource, SplatAttributes};
 use super::exposure::Exposure;
+use super::rules::{Mode, Rules};
 use super::surfels::point_surfels;
 use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check, check_count};
@@ -211,7 +212,7 @@ impl GpuRenderer {
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
-        go_on: &dyn Fn() -> bool,
+        go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
         // `checked` turns every failure of the device into an error.
@@ -225,15 +226,14 @@ impl GpuRenderer {
         view: &View,
         size: [u32; 2],
         settings: &Settings,
-        go_on: &dyn Fn() -> bool,
+        go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
-        let (settings, dot_px) = settings.for_cloud(cloud, size);
-        let settings = &*settings;
         let wanted = SplatAttributes::new(cloud, settings)?;
         let started = Instant::now();
         self.make_resident(cloud, &wanted, &|_| go_on())?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
-        let screen = &view.with_margin(self.prepare(size, &wanted, settings)?);
+        let rules = self.prepare(cloud, size, &wanted, settings)?;
+        let screen = &view.with_margin(rules.margin_px);
         let Self {
             gpu, clock, prepared, upward, exposure, view: last_view, readback, image, layers, times, frame, ..
         } = self;
@@ -242,7 +242,7 @@ impl GpuRenderer {
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (PlacedView { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
-        prepared.write_uniforms(gpu, frame, now, dot_px, settings, &uniform);
+        prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform);
 
         let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock);
@@ -312,18 +312,17 @@ impl GpuRenderer {
         settings: &Settings,
     ) -> Result<(), Error> {
         let size = [texture.width(), texture.height()];
-        let (settings, dot_px) = settings.for_cloud(cloud, size);
-        let settings = &*settings;
         let wanted = SplatAttributes::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
-        let screen = view.with_margin(self.prepare(size, &wanted, settings)?);
+        let rules = self.prepare(cloud, size, &wanted, settings)?;
+        let screen = view.with_margin(rules.margin_px);
         let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (PlacedView { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
-        prepared.write_uniforms(gpu, frame, now, dot_px, settings, &uniform.into_format(texture.format()));
+        prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
@@ -333,32 +332,33 @@ impl GpuRenderer {
         gpu.check_lost()
     }
 
-    /// Makes buffers and steps for a frame, unless those of the last frame fit. Returns the width in pixels of the
-    /// margin around the picture.
-    fn prepare(&mut self, size: [u32; 2], wanted: &SplatAttributes, settings: &Settings) -> Result<u32, Error> {
+    /// Resolves the rules of a frame, and makes its buffers and steps unless those of the last frame fit.
+    fn prepare(
+        &mut self,
+        cloud: &PointCloud,
+        size: [u32; 2],
+        wanted: &SplatAttributes,
+        settings: &Settings,
+    ) -> Result<Rules, Error> {
         // A surfel is the largest record per screen point.
         let has_room = |margin: u32, halves| {
             let screen = size.map(|side| side + 2 * margin);
             ScreenBuffers::has_room::<Surfel>(&self.gpu, screen, halves, self.cloud.capacity())
                 && LayerBuffers::has_room(&self.gpu, screen, wanted.channels())
         };
-        // If memory is short, the margin goes before the halves: it matters along the edges only, halves everywhere.
-        let (margin, halves) = (settings.reconstruction.margin(size), settings.reconstruction.halves());
-        let (margin, halves) = [(margin, halves), (0, halves), (margin, false)]
-            .into_iter()
-            .find(|&(margin, halves)| has_room(margin, halves))
-            .unwrap_or((0, false));
+        let mode = Mode::of(&settings.reconstruction, cloud, size);
+        let rules = Rules::new(&settings.reconstruction, mode, size, has_room);
         let sensors = self.sensors.as_ref().map(|(_, len)| *len);
-        let shape = Shape::new(size, margin, halves, sensors, wanted, settings);
+        let shape = Shape::new(size, &rules, sensors, wanted, settings);
         if self.prepared.as_ref().is_none_or(|prepared| !prepared.is_for(&shape)) {
             // The old buffers go before the new ones come.
             self.prepared = None;
             let Self { gpu, cloud, sensors, depth_noise, frame, passes, .. } = self;
             let resident =
                 ResidentBuffers { cloud, sensors: sensors.as_ref().map(|(buffer, _)| buffer), depth_noise, frame };
-            self.prepared = Some(Prepared::new(gpu, shape, passes, resident, settings)?);
+            self.prepared = Some(Prepared::new(gpu, shape, passes, resident, &rules, settings)?);
         }
-        Ok(margin)
+        Ok(rules)
     }
 }
 

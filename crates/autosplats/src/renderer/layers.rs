@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::camera::Camera;
+use crate::cancel::NEVER;
 use crate::shade::{ColorMode, Image, Scene, Shading, shade};
 use crate::splat::GBuffer;
 use crate::{Error, MAX_SIDE};
@@ -71,6 +72,6 @@ pub fn shade_layers(layers: &GBuffer, camera: &Camera, shading: &Shading) -> Res
     let exposure = shading.exposure.unwrap_or(1.0);
     let scene = Scene { view: &view, up: camera.up.normalize(), origin: DVec3::ZERO, exposure };
     let mut image = Image::default();
-    shade(layers, &scene, shading, true, None, &mut image);
+    shade(layers, &scene, shading, true, None, &mut image, &NEVER);
     Ok(image)
 }

@@ -4,8 +4,10 @@ mod attributes;
 mod cpu;
 mod exposure;
 mod first_radius;
+mod frame;
 mod gpu;
 mod layers;
+mod rules;
 mod settings;
 mod still;
 mod surfels;
@@ -275,8 +277,8 @@ impl Renderer {
     }
 
     /// [Renders](Self::render) unless `go_on` returns false, for example because the view has changed. The CPU calls
-    /// `go_on` before the frame and after each stage. A GPU calls `go_on` before the frame and while points are
-    /// uploaded.
+    /// `go_on` before the frame and every few milliseconds on each thread. A GPU calls `go_on` before the frame and
+    /// while points are uploaded.
     ///
     /// # Errors
     /// Those of [`render`](Self::render), and [`Error::Cancelled`] if `go_on` returned false.
@@ -307,7 +309,7 @@ impl Renderer {
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
-        go_on: &dyn Fn() -> bool,
+        go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         if !go_on() {
             return Err(Error::Cancelled);

@@ -1,20 +1,8 @@
 //! Settings of a picture, and their ranges.
 
-use std::borrow::Cow;
-
-use autosplats_cloud::PointCloud;
-
 use crate::Error;
-use crate::fit::{LONGEST, MIN_SURFACE_POINTS};
 use crate::search::SearchEngine;
 use crate::shade::Shading;
-use crate::splat::STEADY_FRAMES;
-
-/// Shorter side of the picture over the width of its margin.
-const PICTURE_SIDE_PER_MARGIN: u32 = 12;
-/// Splat radius of the points of a very small cloud, as a fraction of the picture's shorter side. The drawn dots are
-/// 1.4 times as wide.
-const DOT_RADIUS_PER_PICTURE_SIDE: f32 = 0.0045;
 
 /// Settings of a picture: everything except the cloud, the camera and the size.
 ///
@@ -158,64 +146,9 @@ impl Reconstruction {
     pub fn paper() -> Self {
         Self { points_per_pixel: 1, adaptive: false, trim: false, coherent: false, ..Self::default() }
     }
-
-    /// Number of frames over which surfels are averaged: `[if the points are the same, if they are others]`.
-    pub(super) fn averaged(&self) -> [u32; 2] {
-        [self.frames_averaged.max(if self.steady { STEADY_FRAMES } else { 1 }), self.frames_averaged]
-    }
-
-    /// Whether frames depend on earlier ones.
-    pub(super) fn smooths(&self) -> bool {
-        self.averaged() != [1; 2]
-    }
-
-    /// Largest ratio of an ellipse's semi-major to its semi-minor axis; 1 for circles.
-    pub(super) fn longest(&self) -> f32 {
-        if self.ellipses { LONGEST } else { 1.0 }
-    }
-
-    /// Ratio of the k-radius of a point with k neighbours to the radius of its splat.
-    pub(super) fn k_radius_per_radius(&self) -> f32 {
-        0.5 * (self.k as f32).sqrt() / self.splat_scale
-    }
-
-    /// Width in pixels of the margin around a picture of `size` pixels; points in the margin serve as neighbours.
-    /// Without a margin, large neighbourhoods would be one-sided along the edges, and noisy surfaces would seem to have
-    /// borders there. The paper's engine has no margin: it leaves one point in a thousand unfinished, and such points
-    /// beside a picture hide much of it. See docs/decisions/0004-margin.md.
-    pub(super) fn margin(&self, size: [u32; 2]) -> u32 {
-        let wants = self.adaptive && self.engine != SearchEngine::SplatCommunication;
-        if wants { size[0].min(size[1]).div_ceil(PICTURE_SIDE_PER_MARGIN) } else { 0 }
-    }
-
-    /// Whether the search of a frame starts from the radii of the last frame.
-    pub(super) fn starts_from_past(&self) -> bool {
-        self.coherent && self.engine == SearchEngine::ScreenGrid
-    }
-
-    /// Whether each half of a pixel keeps a point.
-    pub(super) fn halves(&self) -> bool {
-        self.points_per_pixel == 2 && self.engine != SearchEngine::SplatCommunication
-    }
 }
 
 impl Settings {
-    /// Settings to draw `cloud` with in a picture of `size` pixels, and the splat radius in pixels of its points as
-    /// dots. The radius is 0 if the points are drawn as a surface. Dots are neither adapted, trimmed nor smoothed.
-    // Differs from the paper: a handful of points defines no surface. Discs as wide as their distances would hide each
-    // other and hide that the points are few. See docs/decisions/0025-handful-as-dots.md.
-    pub(super) fn for_cloud(&self, cloud: &PointCloud, size: [u32; 2]) -> (Cow<'_, Self>, f32) {
-        let finite = cloud.positions().iter().filter(|position| position.iter().all(|along| along.is_finite()));
-        let Reconstruction { adaptive, splat_scale, .. } = self.reconstruction;
-        if !adaptive || finite.take(MIN_SURFACE_POINTS).count() == MIN_SURFACE_POINTS {
-            return (Cow::Borrowed(self), 0.0);
-        }
-        let reconstruction =
-            Reconstruction { adaptive: false, trim: false, steady: false, frames_averaged: 1, ..self.reconstruction };
-        let dot_px = splat_scale * DOT_RADIUS_PER_PICTURE_SIDE * size[0].min(size[1]) as f32;
-        (Cow::Owned(Self { reconstruction, ..self.clone() }), dot_px)
-    }
-
     /// Checks every value against its range.
     ///
     /// # Errors
@@ -257,39 +190,5 @@ impl Settings {
             )?;
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use autosplats_cloud::PointCloud;
-    use autosplats_cloud::glam::DVec3;
-
-    use super::*;
-    use crate::{Camera, Projection, Renderer, test_clouds};
-
-    #[test]
-    fn k_radii_come_back_from_splat_radii() {
-        let cloud = PointCloud::new(DVec3::ZERO, test_clouds::plane(2000));
-        let camera = Camera {
-            eye: DVec3::new(0.0, 0.0, 3.0),
-            look_at: DVec3::ZERO,
-            up: DVec3::Y,
-            projection: Projection::PerspectiveFovDeg(50.0),
-        };
-        for (k, splat_scale) in [(10, 1.0), (16, 0.7)] {
-            let reconstruction = Reconstruction { k, splat_scale, ..Reconstruction::paper() };
-            let per_radius = reconstruction.k_radius_per_radius();
-            let mut renderer = Renderer::new();
-            let settings = Settings { reconstruction, ..Settings::default() };
-            renderer.render(&cloud, &camera, [300, 200], &settings).expect("a picture");
-            let surfels = renderer.surfels().expect("surfels");
-            let drawn: Vec<_> = surfels.iter().filter(|surfel| surfel.radius > 0.0).collect();
-            let is_right =
-                |surfel: &&&crate::PointSurfel| (per_radius * surfel.radius / surfel.k_radius - 1.0).abs() < 1e-4;
-            let right = drawn.iter().filter(is_right).count();
-            // The others have fewer than k neighbours, or several at the k-radius.
-            assert!(10 * right > 9 * drawn.len() && right > 500, "k {k}: {right} of {}", drawn.len());
-        }
     }
 }

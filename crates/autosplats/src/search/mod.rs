@@ -7,11 +7,11 @@
 //! For a point P let r̃₀ be the first search radius (§5.1) and d₁ ≤ d₂ ≤ … the distances to the other screen points:
 //!
 //! - *Outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions without a neighbour.
-//!   With adaptive rules P is discarded if d₁ is more than [`OUTLIER_RADIUS_SLACK`] times that radius, or if d₁ exceeds
+//!   With lenient rules P is discarded if d₁ is more than [`OUTLIER_RADIUS_SLACK`] times that radius, or if d₁ exceeds
 //!   that radius and a gap ends the neighbourhood.
 //! - *Gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood. The area of the circle has then
 //!   grown by λ, from r̃₀ on, without a new neighbour. P is *clamped* to κ = j neighbours, and its k-radius is dⱼ.
-//!   With adaptive rules a gap after one neighbour needs d₂ > λ·d₁.
+//!   With lenient rules a gap after one neighbour needs d₂ > λ·d₁.
 //! - Otherwise the k-radius is d₍ₖ₎, and the neighbourhood is all points at that distance or nearer.
 //! - *Bound*: a search ends at the largest radius r̃₀·1.25ⁱ, for whole i, whose sphere projects to a rectangle with at
 //!   most [`MAX_CANDIDATES`] screen points. If no rule ends the neighbourhood and the k-th neighbour lies beyond, P
@@ -132,7 +132,7 @@ impl std::ops::Add for SearchCounts {
     }
 }
 
-/// Factor on the outlier radius up to which adaptive rules keep a point that has k neighbours without a gap. On a
+/// Factor on the outlier radius up to which lenient rules keep a point that has k neighbours without a gap. On a
 /// steep surface, or in front of another surface, density is overestimated and first search radii are too short. With
 /// noise, such a surface would lose most of its points. Outliers have gaps around them.
 pub(crate) const OUTLIER_RADIUS_SLACK: f32 = 1.2;
@@ -147,7 +147,7 @@ pub(crate) struct SearchRules {
     pub(crate) gap_factor: Option<f32>,
     /// Whether a gap after one neighbour must be wider, and whether [`OUTLIER_RADIUS_SLACK`] applies. Random samples
     /// then have that gap no more often than a gap after two neighbours.
-    pub(crate) adaptive: bool,
+    pub(crate) lenient: bool,
 }
 
 /// Rule that ends a neighbourhood before its k-th neighbour.
@@ -173,7 +173,7 @@ impl SearchRules {
     // neighbourhood of λ. The first search radius should prevent such gaps. It is too short where a surface is steep,
     // or where a close-up shows the back of an object through its front.
     fn gap_growth(&self, gap_factor: f32, neighbors: usize) -> f32 {
-        if self.adaptive && neighbors == 1 { gap_factor } else { gap_factor.sqrt() }
+        if self.lenient && neighbors == 1 { gap_factor } else { gap_factor.sqrt() }
     }
 
     /// Applies the rules to squared distances in ascending order, complete up to distance `known`. `None` means that
@@ -182,7 +182,7 @@ impl SearchRules {
         let nearest = squared.first().map_or(known, |d| d.sqrt());
         let outlier_radius = self.outlier_radius(initial_radius);
         let is_lone = nearest > outlier_radius;
-        if is_lone && (!self.adaptive || nearest > OUTLIER_RADIUS_SLACK * outlier_radius) {
+        if is_lone && (!self.lenient || nearest > OUTLIER_RADIUS_SLACK * outlier_radius) {
             return Some(EarlyEnd::Outlier);
         }
         let gap_factor = self.gap_factor?;

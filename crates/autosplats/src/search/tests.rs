@@ -13,7 +13,7 @@ use crate::camera::{Camera, Projection, View};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::test_clouds::{self, EYE, Positions};
 
-type Search = fn(&ScreenPoints, &[u32], &View, &SearchRules, &Past, &mut Neighborhoods);
+type Search = fn(&ScreenPoints, &[u32], &View, &SearchRules, &Past, &mut Neighborhoods, &crate::cancel::Cancel<'_>);
 const ENGINES: [(&str, Search); 1] = [("screen grid", screen_grid::search)];
 
 const KS: [u32; 5] = [1, 3, 10, 16, 64];
@@ -21,7 +21,7 @@ const KS: [u32; 5] = [1, 3, 10, 16, 64];
 const ROUNDING: f64 = 2e-6;
 
 fn rules(k: u32) -> SearchRules {
-    SearchRules { k, outlier_expansions: Some(3), gap_factor: Some(4.0), adaptive: true }
+    SearchRules { k, outlier_expansions: Some(3), gap_factor: Some(4.0), lenient: true }
 }
 
 fn cameras() -> [Camera; 2] {
@@ -32,7 +32,7 @@ fn cameras() -> [Camera; 2] {
 fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
     let view = camera.view(DVec3::ZERO, size).expect("a view");
-    (Projector::default().project(&cloud, &view, &ProjectRules::usual(k)).clone(), view)
+    (Projector::default().project(&cloud, &view, &ProjectRules::usual(k), &crate::cancel::NEVER).clone(), view)
 }
 
 /// The other screen points and their distances, ascending, for each screen point.
@@ -96,13 +96,13 @@ impl Oracle {
             rules.outlier_expansions.is_some_and(|e0| exceeds(distance(1), radius(e0)))
         };
         let is_lone = beyond(1.0);
-        let is_alone = is_lone && (!rules.adaptive || beyond(f64::from(OUTLIER_RADIUS_SLACK)));
+        let is_alone = is_lone && (!rules.lenient || beyond(f64::from(OUTLIER_RADIUS_SLACK)));
         if is_alone || self.others[point].is_empty() {
             return Expected { fate: Fate::Outlier, count: 0, radius: 0.0, unsure };
         }
         let gap = rules.gap_factor.and_then(|lambda| {
             let growth = f64::from(lambda).sqrt();
-            let after = |j| if rules.adaptive && j == 1 { f64::from(lambda) } else { growth };
+            let after = |j| if rules.lenient && j == 1 { f64::from(lambda) } else { growth };
             (1..k).find(|&j| exceeds(distance(j + 1), (after(j) * distance(j)).max(growth * initial_radius)))
         });
         if is_lone && gap.is_some() {
@@ -218,14 +218,22 @@ fn every_cloud_with_every_rule() {
                 for (e0, lambda) in
                     [(Some(3), Some(4.0)), (Some(0), Some(4.0)), (Some(1), None), (None, Some(2.0)), (None, None)]
                 {
-                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0.is_some() };
+                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient: e0.is_some() };
                     let all: Vec<u32> = (0..count as u32).collect();
                     let third: Vec<u32> = all.iter().copied().step_by(3).collect();
                     let single: Vec<u32> = all.iter().copied().skip(count / 2).take(1).collect();
                     for (engine, search) in ENGINES {
                         for queries in [&all, &third, &single] {
                             let mut neighborhoods = Neighborhoods::default();
-                            search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);
+                            search(
+                                &screen,
+                                queries,
+                                &view,
+                                &rules,
+                                &Past::default(),
+                                &mut neighborhoods,
+                                &crate::cancel::NEVER,
+                            );
                             let outcome = compare(&oracle, &radii, queries, &rules, &neighborhoods);
                             let projection = camera.projection;
                             assert!(outcome.is_ok(), "{engine}, {name}, {projection:?}, {rules:?}: {outcome:?}");
@@ -252,7 +260,15 @@ fn comparison_sees_each_kind_of_error() {
     let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
     let outcome = |rules: SearchRules, spoil: fn(&mut Neighborhoods)| {
         let mut neighborhoods = Neighborhoods::default();
-        screen_grid::search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
+        screen_grid::search(
+            &screen,
+            &queries,
+            &view,
+            &rules,
+            &Past::default(),
+            &mut neighborhoods,
+            &crate::cancel::NEVER,
+        );
         spoil(&mut neighborhoods);
         compare(&oracle, &radii, &queries, &self::rules(10), &neighborhoods)
     };
@@ -273,7 +289,7 @@ fn comparison_sees_each_kind_of_error() {
         SearchRules { gap_factor: None, ..rules(10) },
         SearchRules { gap_factor: Some(5.0), ..rules(10) },
         SearchRules { outlier_expansions: Some(0), ..rules(10) },
-        SearchRules { adaptive: false, ..rules(10) },
+        SearchRules { lenient: false, ..rules(10) },
     ];
     for rules in other_rules {
         assert!(outcome(rules, |_| ()).is_err(), "not noticed: {rules:?}");
@@ -296,10 +312,18 @@ fn a_surface_before_a_denser_one_is_no_outlier() {
     let queries: Vec<u32> =
         (0..screen.points.len() as u32).filter(|&q| screen.points[q as usize].position_view[2] < 40.0).collect();
     assert_eq!(queries.len(), 400, "all of the wall is seen");
-    let outliers = |adaptive: bool| {
-        let rules = SearchRules { k: 10, outlier_expansions: Some(1), gap_factor: Some(4.0), adaptive };
+    let outliers = |lenient: bool| {
+        let rules = SearchRules { k: 10, outlier_expansions: Some(1), gap_factor: Some(4.0), lenient };
         let mut neighborhoods = Neighborhoods::default();
-        screen_grid::search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
+        screen_grid::search(
+            &screen,
+            &queries,
+            &view,
+            &rules,
+            &Past::default(),
+            &mut neighborhoods,
+            &crate::cancel::NEVER,
+        );
         neighborhoods.counts.outliers
     };
     // The number of points of the surface behind in a cell varies a little.
@@ -324,7 +348,15 @@ fn ties_belong() {
         let middle = screen.points.iter().position(|p| at(p) == [0.0, 0.0, 64.0]).expect("a point in the middle");
         for (engine, search) in ENGINES {
             let mut neighborhoods = Neighborhoods::default();
-            search(&screen, &[middle as u32], &view, &rules(k), &Past::default(), &mut neighborhoods);
+            search(
+                &screen,
+                &[middle as u32],
+                &view,
+                &rules(k),
+                &Past::default(),
+                &mut neighborhoods,
+                &crate::cancel::NEVER,
+            );
             let found = found(&neighborhoods, 0);
             assert_eq!(found.count as usize, count, "{engine}, k = {k}: neighbours");
             assert_eq!(found.k_radius as f32, squared.sqrt(), "{engine}, k = {k}: k-radius");
@@ -341,11 +373,11 @@ fn bounded_searches_stay_exact_as_far_as_they_go() {
     let positions = test_clouds::outliers(60_000);
     let (screen, view) = screen(&positions, &camera, [400, 400], 10);
     assert!(screen.points.len() > 4 * MAX_CANDIDATES, "there is more than may be read");
-    let rules = SearchRules { k: 10, outlier_expansions: None, gap_factor: None, adaptive: true };
+    let rules = SearchRules { k: 10, outlier_expansions: None, gap_factor: None, lenient: true };
     let queries: Vec<u32> = (0..screen.points.len() as u32).step_by(101).collect();
     for (engine, search) in ENGINES {
         let mut neighborhoods = Neighborhoods::default();
-        search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
+        search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods, &crate::cancel::NEVER);
         let SearchCounts { outliers, clamped, bounded } = neighborhoods.counts;
         assert!(bounded > 0, "{engine}: none meets the bound");
         assert_eq!(outliers + clamped, bounded, "{engine}: nothing else ends a search here");
@@ -377,10 +409,10 @@ fn huge_coordinates_reach_no_sum() {
             positions.extend((0..huge).map(|i| (forward * (1e38 * (1.0 + 0.01 * i as f32))).to_array()));
             let (screen, view) = screen(&positions, &camera, [90, 70], k);
             let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
-            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, adaptive: true };
+            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, lenient: true };
             for (engine, search) in ENGINES {
                 let mut neighborhoods = Neighborhoods::default();
-                search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
+                search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods, &crate::cancel::NEVER);
                 for index in 0..queries.len() {
                     let found = found(&neighborhoods, index);
                     let sums = found.second.iter().sum::<f64>() + found.offset.element_sum() + found.k_radius;

@@ -13,6 +13,7 @@ use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
 use super::over_time::PictureInProgress;
 use super::{Background, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::splat::GBuffer;
 
 /// Shares of light and of colour left on the backs of surfaces.
@@ -69,6 +70,7 @@ pub(crate) fn shade(
     keep_linear: bool,
     following: Option<PictureInProgress<'_>>,
     image: &mut Image,
+    cancel: &Cancel<'_>,
 ) -> Option<[f64; 2]> {
     let [width, height] = [layers.width as usize, layers.height as usize];
     image.width = layers.width;
@@ -84,11 +86,17 @@ pub(crate) fn shade(
         bands.zip(image.linear.par_chunks_mut(width * rows)).for_each_init(
             Band::default,
             |band, ((i, pixels), linear)| {
-                band.shade(&shader, inks, i * rows, pixels, linear);
+                if !cancel.is_given_up() {
+                    band.shade(&shader, inks, i * rows, pixels, linear);
+                }
             },
         );
     } else {
-        bands.for_each_init(Band::default, |band, (i, pixels)| band.shade(&shader, inks, i * rows, pixels, &mut []));
+        bands.for_each_init(Band::default, |band, (i, pixels)| {
+            if !cancel.is_given_up() {
+                band.shade(&shader, inks, i * rows, pixels, &mut []);
+            }
+        });
     }
     if let Some(following) = following {
         following.average(layers, image);

@@ -42,7 +42,7 @@ fn exposed(layers: &GBuffer, shading: &Shading, exposure: f32) -> Image {
     let view = view([layers.width, layers.height]);
     let mut image = Image::default();
     let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure };
-    let _ = shade(layers, &scene, shading, true, None, &mut image);
+    let _ = shade(layers, &scene, shading, true, None, &mut image, &crate::cancel::NEVER);
     assert_eq!(image.pixels.len(), (layers.width * layers.height) as usize, "size of the image");
     image
 }
@@ -132,6 +132,7 @@ fn the_range_that_was_shown_is_told() {
             false,
             None,
             &mut Image::default(),
+            &crate::cancel::NEVER,
         )
     };
     let given = |color| Shading { range: Some([1.0, 3.0]), ..flat(color) };

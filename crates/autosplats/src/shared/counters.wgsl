@@ -14,7 +14,7 @@ const ACTIVE = 8u;
 const PASSIVE = 9u;
 const RECOVERED = 10u;
 // Points with fewer than k neighbours because of a gap or the bound on work, points that reached the bound, and
-// discarded surfels.
+// dropped surfels.
 const CLAMPED = 11u;
 const BOUNDED = 12u;
 const OUTLIERS = 13u;

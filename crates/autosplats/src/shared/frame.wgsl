@@ -16,8 +16,8 @@ struct Frame {
     // 1 if each half of a pixel keeps its nearest point, 0 if each pixel does.
     halves: u32,
     grid_culling: u32,
-    // 1 if the adapt stage runs.
-    adaptive: u32,
+    // 1 if the search is lenient towards gaps after one neighbour and towards outliers.
+    lenient: u32,
     keep_outliers: u32,
     splat_scale: f32,
     // Radius within which a point must have a neighbour, in first search radii.
@@ -44,6 +44,10 @@ struct Frame {
     past_focal_px: f32,
     // Radius in pixels of the dots that all points are; 0 if they are drawn as a surface.
     dot_px: f32,
+    // 1 if surfels on scan lines keep their full length.
+    scan_lines: u32,
+    // 1 if outliers are held against the density around them.
+    compares_density: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

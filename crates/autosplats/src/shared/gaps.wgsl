@@ -2,6 +2,6 @@
 
 // Factor on the distance of the furthest of `neighbors` neighbours, up to which the next one must follow.
 fn gap_growth_after(neighbors: u32) -> f32 {
-    let is_single = frame.adaptive == 1u && neighbors == 1u;
+    let is_single = frame.lenient == 1u && neighbors == 1u;
     return select(frame.gap_growth, frame.gap_growth * frame.gap_growth, is_single);
 }

@@ -19,7 +19,7 @@ struct Neighborhood {
 struct Surfel {
     // The point, or the surface position that was fitted to noisy points.
     center: vec3f,
-    // Semi-minor axis, world units; 0 if the point was discarded.
+    // Semi-minor axis, world units; a dropped surfel has none.
     radius: f32,
     // Unit normal towards the eye.
     normal: vec3f,
@@ -34,9 +34,29 @@ struct Surfel {
     pixel: u32,
     // Index in the cloud.
     source: u32,
-    // Index among the screen points; BACK is set if the surface shows its back.
-    screen: u32,
+    // Index among the screen points, below 2³⁰, and the flags BACK and LINE.
+    screen_and_flags: u32,
 }
 
-// Set if the eye sees the side that the point's sensor did not see.
+// The eye sees the side that the point's sensor did not see.
 const BACK = 0x80000000u;
+// The neighbourhood is a line, which has no width to draw.
+const LINE = 0x40000000u;
+
+// Index among the screen points.
+fn screen_of(surfel: Surfel) -> u32 {
+    return surfel.screen_and_flags & ~(BACK | LINE);
+}
+
+fn shows_back(surfel: Surfel) -> bool {
+    return (surfel.screen_and_flags & BACK) != 0u;
+}
+
+fn is_line(surfel: Surfel) -> bool {
+    return (surfel.screen_and_flags & LINE) != 0u;
+}
+
+// Whether the point is dropped: nothing is drawn.
+fn is_dropped(surfel: Surfel) -> bool {
+    return surfel.radius == 0.0;
+}

@@ -1,10 +1,9 @@
-//! Attributes of splats: the channels that they carry, their sums over a tile, and the layers that result.
+//! Attributes of splats: the channels that they carry, and their sums over a tile.
 
 use autosplats_cloud::FieldValues;
 
-use super::trim::PixelSurface;
-use super::{GBuffer, TILE_AREA};
-use crate::camera::View;
+use super::TILE_AREA;
+use super::layers::{Channels, TileLayers};
 use crate::fit::Surfel;
 
 /// Most channels a splat can carry: normal, colour, scalar with its weight, radius, k-radius, curvature, back.
@@ -29,6 +28,12 @@ pub(crate) struct PointColors<'a> {
 }
 
 impl Attributes<'_> {
+    /// The optional ones of the layers.
+    pub(super) fn optional(&self) -> Channels {
+        let Self { color, scalar, measures, backs } = *self;
+        Channels { color: color.is_some(), scalar: scalar.is_some(), measures, backs }
+    }
+
     /// Number of channels that a splat carries.
     pub(super) fn channels(&self) -> usize {
         3 + if self.color.is_some() { 3 } else { 0 }
@@ -132,123 +137,5 @@ impl TileSums {
             let sum = channel();
             layers.back.iter_mut().enumerate().for_each(|(i, back)| *back = mean(sum, &self.weight, i));
         }
-    }
-}
-
-impl TileLayers<'_> {
-    /// Whether there is a surface at pixel `at` of the tile.
-    pub(super) fn covers(&self, at: usize) -> bool {
-        self.weight[at] > 0.0
-    }
-
-    /// The surface at pixel `at` of the tile.
-    pub(super) fn shown(&self, at: usize) -> PixelSurface {
-        PixelSurface { depth: self.depth[at], normal: self.normal[at] }
-    }
-
-    /// Empties the tile.
-    pub(super) fn clear_all(&mut self) {
-        self.weight.fill(0.0);
-        self.depth.fill(f32::INFINITY);
-        self.normal.fill([0.0; 3]);
-        self.point.fill(u32::MAX);
-        self.color.fill([0.0; 3]);
-        self.scalar.fill(f32::NAN);
-        for measure in [&mut self.radius, &mut self.k_radius, &mut self.curvature, &mut self.back] {
-            measure.fill(0.0);
-        }
-    }
-
-    /// Empties pixel `at` of the tile.
-    pub(super) fn clear(&mut self, at: usize) {
-        self.weight[at] = 0.0;
-        self.depth[at] = f32::INFINITY;
-        self.normal[at] = [0.0; 3];
-        self.point[at] = u32::MAX;
-        if let Some(color) = self.color.get_mut(at) {
-            *color = [0.0; 3];
-        }
-        if let Some(scalar) = self.scalar.get_mut(at) {
-            *scalar = f32::NAN;
-        }
-        for measure in [&mut self.radius, &mut self.k_radius, &mut self.curvature, &mut self.back] {
-            if let Some(value) = measure.get_mut(at) {
-                *value = 0.0;
-            }
-        }
-    }
-}
-
-/// The part of each layer that belongs to one tile; empty for a layer that is empty.
-#[derive(Debug)]
-pub(super) struct TileLayers<'a> {
-    weight: &'a mut [f32],
-    depth: &'a mut [f32],
-    normal: &'a mut [[f32; 3]],
-    point: &'a mut [u32],
-    color: &'a mut [[f32; 3]],
-    scalar: &'a mut [f32],
-    radius: &'a mut [f32],
-    k_radius: &'a mut [f32],
-    curvature: &'a mut [f32],
-    back: &'a mut [f32],
-}
-
-impl GBuffer {
-    /// Sizes the layers for a frame. Returns whether all lengths are unchanged, so that the layers still hold the last
-    /// frame.
-    pub(super) fn resize(&mut self, view: &View, area: usize, attributes: &Attributes<'_>) -> bool {
-        fn fit<T: Copy + Default>(layer: &mut Vec<T>, len: usize) -> bool {
-            let fits = layer.len() == len;
-            layer.resize(len, T::default());
-            fits
-        }
-        let wanted = |wanted: bool| if wanted { area } else { 0 };
-        [self.width, self.height] = view.picture_size();
-        self.margin = view.margin;
-        let fits = [
-            fit(&mut self.weight, area),
-            fit(&mut self.depth, area),
-            fit(&mut self.normal, area),
-            fit(&mut self.point, area),
-            fit(&mut self.color, wanted(attributes.color.is_some())),
-            fit(&mut self.scalar, wanted(attributes.scalar.is_some())),
-            fit(&mut self.radius, wanted(attributes.measures)),
-            fit(&mut self.k_radius, wanted(attributes.measures)),
-            fit(&mut self.curvature, wanted(attributes.measures)),
-            fit(&mut self.back, wanted(attributes.backs)),
-        ];
-        fits == [true; 10]
-    }
-
-    /// Cuts all layers into tiles.
-    pub(super) fn tiles(&mut self) -> Vec<TileLayers<'_>> {
-        fn cut<'a, T>(rest: &mut &'a mut [T]) -> &'a mut [T] {
-            rest.split_off_mut(..TILE_AREA).unwrap_or_default()
-        }
-        let tiles = self.weight.len() / TILE_AREA;
-        let mut weight = self.weight.as_mut_slice();
-        let mut depth = self.depth.as_mut_slice();
-        let mut normal = self.normal.as_mut_slice();
-        let mut point = self.point.as_mut_slice();
-        let mut color = self.color.as_mut_slice();
-        let mut scalar = self.scalar.as_mut_slice();
-        let mut radius = self.radius.as_mut_slice();
-        let mut k_radius = self.k_radius.as_mut_slice();
-        let mut curvature = self.curvature.as_mut_slice();
-        let mut back = self.back.as_mut_slice();
-        let tile = |_| TileLayers {
-            weight: cut(&mut weight),
-            depth: cut(&mut depth),
-            normal: cut(&mut normal),
-            point: cut(&mut point),
-            color: cut(&mut color),
-            scalar: cut(&mut scalar),
-            radius: cut(&mut radius),
-            k_radius: cut(&mut k_radius),
-            curvature: cut(&mut curvature),
-            back: cut(&mut back),
-        };
-        (0..tiles).map(tile).collect()
     }
 }

@@ -92,7 +92,7 @@ fn load(slot: u32, index: u32) {
     // Approximate reach from the centre, in pixels.
     reaches[slot] = 0.5 * max(span.x, span.y) + 0.5;
     let words = u32(COLOR) + u32(SCALAR);
-    let screen = surfel.screen & ~BACK;
+    let screen = screen_of(surfel);
     if COLOR {
         let srgb = values[words * screen];
         colors[slot] = vec3f(to_linear(srgb), to_linear(srgb >> 8u), to_linear(srgb >> 16u));
@@ -107,7 +107,7 @@ fn load(slot: u32, index: u32) {
         measures[slot] = vec3f(surfel.radius, surfel.k_radius, surfel.curvature);
     }
     if BACKS {
-        backs[slot] = f32(surfel.screen >= BACK);
+        backs[slot] = f32(shows_back(surfel));
     }
 }
 

@@ -8,10 +8,11 @@ use super::centers::add_centers;
 use super::raster::{Tile, draw_attributes, draw_depth};
 use super::setup::RECOVER_DISTANCE_RADII;
 use super::trim::blurred::BlurredBorders;
-use super::trim::{EMPTY, Outline, Rim, rim};
+use super::trim::{EMPTY, Outline, Rim, TrimRules, rim};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
 use crate::adapt::Noise;
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::fit::Surfel;
 use crate::project::Sixteenths;
 
@@ -49,7 +50,7 @@ impl Splatter {
     }
 
     /// Visibility pass: draws the surfels from index `first` on into the depth map [Paper, §7].
-    pub(crate) fn add(&mut self, surfels: &[Surfel], first: usize, view: &View) {
+    pub(crate) fn add(&mut self, surfels: &[Surfel], first: usize, view: &View, cancel: &Cancel<'_>) {
         let before = self.used;
         let added = surfels[first..].par_chunks(RUN);
         self.used += added.len();
@@ -58,9 +59,11 @@ impl Splatter {
         }
         let runs = &mut self.runs[before..self.used];
         added.zip(&mut *runs).enumerate().for_each(|(index, (surfels, run))| {
-            run.set_up(first + index * RUN, surfels, view);
+            if !cancel.is_given_up() {
+                run.set_up(first + index * RUN, surfels, view);
+            }
         });
-        draw_depth_map(runs, view, &mut self.depth);
+        draw_depth_map(runs, view, &mut self.depth, cancel);
     }
 
     /// Whether the depth map hides a point at this pixel and depth, and will do so however silhouettes change.
@@ -78,7 +81,7 @@ impl Splatter {
 
     /// Refinement: redraws the depth map with only those surfels whose point it does not hide [Paper, §7, Depth
     /// Refinement].
-    pub(crate) fn refine(&mut self, surfels: &[Surfel], view: &View) {
+    pub(crate) fn refine(&mut self, surfels: &[Surfel], view: &View, cancel: &Cancel<'_>) {
         std::mem::swap(&mut self.depth, &mut self.previous);
         clear(&mut self.depth, view);
         let runs = &mut self.runs[..self.used];
@@ -91,13 +94,19 @@ impl Splatter {
                 *alive = !splat.covers_nothing() & !hidden;
             }
         });
-        draw_depth_map(runs, view, &mut self.depth);
+        draw_depth_map(runs, view, &mut self.depth, cancel);
     }
 
     /// Attribute pass: the weighted mean of all living surfels within ε of the depth map [Paper, §7].
-    pub(crate) fn attributes(&mut self, surfels: &[Surfel], view: &View, attributes: &Attributes<'_>) -> &GBuffer {
+    pub(crate) fn attributes(
+        &mut self,
+        surfels: &[Surfel],
+        view: &View,
+        attributes: &Attributes<'_>,
+        cancel: &Cancel<'_>,
+    ) -> &GBuffer {
         let Self { runs, used, depth, rims, centers, layers, empty, .. } = self;
-        if !layers.resize(view, depth.len(), attributes) {
+        if !layers.resize(view, depth.len(), attributes.optional()) {
             empty.clear();
         }
         rims.resize(depth.len(), 0.0);
@@ -119,7 +128,10 @@ impl Splatter {
             *empty = false;
             sums.clear(attributes);
             add_centers(&runs[..*used], surfels, tile(index, view), centers);
-            for run in &runs[..*used] {
+            for run in runs[..*used].iter().filter(|run| !run.tile(index).is_empty()) {
+                if cancel.is_given_up() {
+                    return;
+                }
                 draw_attributes(run, surfels, tile(index, view), view, depth, attributes, sums);
             }
             sums.normalize(attributes, &mut layers);
@@ -132,20 +144,25 @@ impl Splatter {
     }
 
     /// Trims the attributes just drawn, by the points in `sixteenths` and, where they have `noise`, by their density.
-    /// K-radii are `per_radius` splat radii. Returns the layers and the number of covered pixels of the picture.
+    /// Returns the number of covered pixels of the picture.
     pub(crate) fn trim(
         &mut self,
         view: &View,
         sixteenths: &Sixteenths,
-        (noise, per_radius): (Noise, f32),
-    ) -> (&GBuffer, usize) {
+        noise: Noise,
+        &TrimRules { k_radius_per_radius }: &TrimRules,
+        cancel: &Cancel<'_>,
+    ) -> usize {
+        if cancel.is_given_up() {
+            return 0;
+        }
         let Self { rims, centers, layers, .. } = self;
-        let blurred = BlurredBorders::new(noise, per_radius, rims, sixteenths, view);
+        let blurred = BlurredBorders::new(noise, k_radius_per_radius, rims, sixteenths, view);
         let outline = Outline { rims, centers, sixteenths, view, blurred: blurred.as_ref() };
         let tiles = layers.tiles().into_par_iter().enumerate();
         let covered = tiles.map(|(index, mut layers)| {
             let [x0, y0] = tile(index, view).origin;
-            if rims[index * TILE_AREA..][..TILE_AREA].iter().all(|&rim| rim == EMPTY) {
+            if rims[index * TILE_AREA..][..TILE_AREA].iter().all(|&rim| rim == EMPTY) || cancel.is_given_up() {
                 return 0;
             }
             let edges = outline.edges([x0, y0]);
@@ -161,16 +178,15 @@ impl Splatter {
             }
             covered
         });
-        let covered = covered.sum();
-        (layers, covered)
+        covered.sum()
     }
 
-    /// The attributes just drawn, untrimmed, and the number of covered pixels of the picture.
-    pub(crate) fn whole(&self) -> (&GBuffer, usize) {
+    /// Number of covered pixels of the picture, untrimmed.
+    pub(crate) fn covered(&self) -> usize {
         let layers = &self.layers;
         let covers = |x: usize, y: usize| layers.weight[layers.index(x, y)] > 0.0;
         let row = |y: u32| (0..layers.width as usize).filter(|&x| covers(x, y as usize)).count();
-        (layers, (0..layers.height).into_par_iter().map(row).sum())
+        (0..layers.height).into_par_iter().map(row).sum()
     }
 }
 
@@ -187,9 +203,16 @@ fn tile(index: usize, view: &View) -> Tile {
 }
 
 /// Draws the depth of all living splats of `runs`, tile by tile.
-fn draw_depth_map(runs: &[Run], view: &View, depth: &mut [f32]) {
+fn draw_depth_map(runs: &[Run], view: &View, depth: &mut [f32], cancel: &Cancel<'_>) {
+    if cancel.is_given_up() {
+        // Runs may be those of another frame.
+        return;
+    }
     depth.par_chunks_mut(TILE_AREA).enumerate().for_each(|(index, depth)| {
-        for run in runs {
+        for run in runs.iter().filter(|run| !run.tile(index).is_empty()) {
+            if cancel.is_given_up() {
+                return;
+            }
             draw_depth(run, tile(index, view), view, depth);
         }
     });

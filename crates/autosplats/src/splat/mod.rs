@@ -30,6 +30,7 @@ pub(crate) use layers::{Channels, LayerBuffers};
 #[cfg(test)]
 pub(crate) use layers::{Cover, upload_layers};
 pub(crate) use over_time::{OverTime, STEADY_FRAMES};
+pub(crate) use trim::TrimRules;
 #[cfg(test)]
 pub(crate) use trim::blurred::{BLOCK_PX, FRINGE_BLOCKS};
 

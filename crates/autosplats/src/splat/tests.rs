@@ -201,10 +201,10 @@ fn draw_with(
     splatter.begin(view);
     // Two parts, as the renderer adds recovered points.
     let first = surfels.len() * 2 / 3;
-    splatter.add(&surfels[..first], 0, view);
-    splatter.add(surfels, first, view);
-    (0..refinements).for_each(|_| splatter.refine(surfels, view));
-    splatter.attributes(surfels, view, attributes).clone()
+    splatter.add(&surfels[..first], 0, view, &crate::cancel::NEVER);
+    splatter.add(surfels, first, view, &crate::cancel::NEVER);
+    (0..refinements).for_each(|_| splatter.refine(surfels, view, &crate::cancel::NEVER));
+    splatter.attributes(surfels, view, attributes, &crate::cancel::NEVER).clone()
 }
 
 /// Bits of all layers.
@@ -324,7 +324,7 @@ pub(super) fn surfels(seed: u64, count: usize, discs: Discs, view: &View) -> Vec
             curvature: 0.3 * random.unit(),
             pixel: (px[1] as u32) << 16 | px[0] as u32,
             source: source as u32,
-            screen: source as u32 | if shows_back(source) { Surfel::BACK } else { 0 },
+            screen_and_flags: source as u32 | if shows_back(source) { Surfel::BACK } else { 0 },
         }
     };
     (0..count).map(&mut one).collect()

@@ -28,6 +28,7 @@ mod tests;
 
 use self::blurred::BlurredBorders;
 use super::centers::mean;
+use super::layers::PixelSurface;
 use super::{TILE, TILE_AREA, tiled_index};
 use crate::camera::View;
 use crate::project::Sixteenths;
@@ -112,6 +113,13 @@ const QUARTERS: [u64; 4] =
 const DISC: u64 = SIDES[0][0] | SIDES[0][1];
 const OWN: u64 = 0x3c3c_3c3c << 16;
 
+/// Settings of trimming.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TrimRules {
+    /// Ratio of the k-radius of a point with k neighbours to the radius of its splat.
+    pub(crate) k_radius_per_radius: f32,
+}
+
 /// State of a pixel for trimming: [`EMPTY`], or the reach of its heaviest splat in pixels, negated in a core.
 pub(super) type Rim = f32;
 pub(super) const EMPTY: Rim = 0.0;
@@ -125,14 +133,6 @@ pub(super) fn rim(weight: f32, heaviest: f32, reach_px: f32) -> Rim {
     } else {
         EMPTY
     }
-}
-
-/// Visible surface at a pixel before trimming.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PixelSurface {
-    pub(super) depth: f32,
-    /// Unit normal, view space.
-    pub(super) normal: [f32; 3],
 }
 
 /// Kind of emptiness close to a pixel.

@@ -1,5 +1,8 @@
 //! Surfels of a frame on the host, and frames with precomputed normals.
 
+use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::Ordering::Relaxed;
+
 use crate::test_clouds::EYE;
 use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::{DVec3, Vec3};
@@ -82,24 +85,29 @@ fn a_frame_that_fails_leaves_the_surfels_of_the_one_before() {
 fn a_frame_that_is_given_up_leaves_nothing_behind() {
     let cloud = sphere();
     let settings = Settings::default();
-    let whole = Renderer::new().render(&cloud, &camera(), SIZE, &settings).expect("a picture").image.clone();
     let mut renderer = Renderer::new();
-    let mut given_up = 0;
-    for most in 0.. {
-        let asked = std::cell::Cell::new(0);
-        let go_on = || asked.replace(asked.get() + 1) < most;
-        match renderer.render_while(&cloud, &camera(), SIZE, &settings, &go_on) {
-            Ok(frame) => {
-                assert!(*frame.image == whole, "the same picture after {given_up} that were given up");
-                break;
-            }
-            Err(error) => assert!(matches!(error, Error::Cancelled), "{error}"),
-        }
-        given_up += 1;
-        assert_eq!(asked.get(), most + 1, "nothing is done after a no");
-        assert!(renderer.surfels().expect("none").is_empty(), "half a frame has no surfels");
+    // On several threads some may ask before they hear the answer.
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("threads");
+    // The picture unless given up, and how often the caller was asked.
+    let mut asked_at_most = |most: usize| {
+        let asked = AtomicUsize::new(0);
+        let go_on = || asked.fetch_add(1, Relaxed) < most;
+        let frame = threads.install(|| renderer.render_while(&cloud, &camera(), SIZE, &settings, &go_on));
+        let image = frame.map(|frame| frame.image.clone());
+        let surfels = renderer.surfels().expect("surfels");
+        (image, asked.into_inner(), surfels)
+    };
+    let (whole, all, _) = asked_at_most(usize::MAX);
+    assert!(all > 200, "asked once a task at least, not {all} times");
+    for moment in 0..20 {
+        let most = moment * all / 20;
+        let (image, asked, surfels) = asked_at_most(most);
+        assert!(matches!(image, Err(Error::Cancelled)), "given up after {most} of {all}");
+        assert_eq!(asked, most + 1, "nothing is done after a no");
+        assert!(surfels.is_empty(), "half a frame has no surfels");
     }
-    assert!(given_up > 6, "asked once a stage at least, not {given_up} times");
+    let (again, ..) = asked_at_most(usize::MAX);
+    assert!(again.expect("a picture") == whole.expect("a picture"), "the same picture after many that were given up");
 }
 
 #[test]

@@ -10,7 +10,7 @@ fn nothing_is_left_of_the_frame_before() {
     let small = Case::new(&noisy(test_clouds::sphere(900), 0.05), PROJECTIONS[1], [150, 200]);
     let mut cells = Cells::default();
     for case in [&sphere, &small, &sphere, &small] {
-        cells.fill(&case.screen, &case.view, crate::adapt::tests::K);
+        cells.fill(&case.screen, &case.view, crate::adapt::tests::K, &crate::cancel::NEVER);
         let fresh = case.cells();
         assert!(cells.levels == fresh.levels, "cells of {:?}", case.view);
     }

@@ -35,7 +35,7 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> DeviceResults {
     let surfels = surfel_buffer(gpu, screen.capacity).expect("room");
     gpu.queue.write_buffer(&surfels, 0, bytemuck::cast_slice(&fitted));
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-    let told = FrameUniform { adaptive: 1, longest: f32::MAX, ..FrameUniform::new(&case.view, K) };
+    let told = FrameUniform { longest: f32::MAX, ..FrameUniform::new(&case.view, K) };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     let mut steps = passes.steps_cells(gpu, &frame, &screen, &buffers);
@@ -125,7 +125,7 @@ fn compare_usual(device: FrameStatistics, host: FrameStatistics) -> Result<(), S
 
 fn is_like(device: &Surfel, host: &Surfel) -> bool {
     let apart = (0..3).map(|axis| (device.center[axis] - host.center[axis]).powi(2)).sum::<f32>().sqrt();
-    let of_fit = |surfel: &Surfel| (surfel.k_radius, surfel.source, surfel.screen);
+    let of_fit = |surfel: &Surfel| (surfel.k_radius, surfel.source, surfel.screen());
     of_fit(device) == of_fit(host)
         && (device.radius - host.radius).abs() <= 1e-5 * host.radius
         && angle(device.normal, host.normal) < 0.5

@@ -7,7 +7,8 @@ use pulp::Simd;
 use super::{Gathered, Plane, Quadric, tangents};
 use crate::adapt::STEP;
 use crate::adapt::cells::{CellRow, Cells, Cluster, Level};
-use crate::adapt::cpu::{Goal, choose};
+use crate::adapt::choose::choose;
+use crate::adapt::rules::Goal;
 use crate::adapt::tests::angle;
 use crate::camera::{Camera, Projection, View};
 

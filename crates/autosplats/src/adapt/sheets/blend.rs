@@ -5,7 +5,7 @@ use pulp::Simd;
 
 use super::{SHEETS, Sheet, Sheets};
 use crate::adapt::cells::Cells;
-use crate::adapt::cpu::{AGREE_ERRORS, Goal, MAX_MOVE_NOISES};
+use crate::adapt::rules::{AGREE_ERRORS, Goal, MAX_MOVE_NOISES};
 use crate::camera::View;
 use crate::search::{LANES, Lanes};
 use crate::simd::F32s;

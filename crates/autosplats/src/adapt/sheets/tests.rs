@@ -6,7 +6,7 @@ use pulp::Simd;
 use super::blend::{Blend, NearbySheets};
 use super::{SHEET_LEVELS, SHEETS, Sheets};
 use crate::adapt::cells::Cells;
-use crate::adapt::cpu::{Goal, MAX_MOVE_NOISES};
+use crate::adapt::rules::{Goal, MAX_MOVE_NOISES};
 use crate::adapt::tests::{Case, PROJECTIONS, angle};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -20,7 +20,7 @@ fn sheets_of(case: &Case, cells: &Cells) -> Sheets {
     sheets.clear(cells);
     sheets.level = SHEET_LEVELS[0];
     case.fitted[0].iter().filter(|surfel| surfel.radius > 0.0).for_each(|surfel| sheets.ask(surfel, cells, &case.view));
-    sheets.fit(cells, &|_, _, _| (NOISE, false), &case.view);
+    sheets.fit(cells, &|_, _, _| (NOISE, false), &case.view, &crate::cancel::NEVER);
     sheets
 }
 

@@ -17,8 +17,15 @@ use crate::search::screen_grid::gpu::tests::{Moments, host_moments};
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE, Random};
 
-const RULES: FitRules =
-    FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false, dot_px: 0.0 };
+const RULES: FitRules = FitRules {
+    k: 10,
+    splat_scale: 1.0,
+    longest: LONGEST,
+    scan_lines: false,
+    keep_outliers: false,
+    compares_density: false,
+    dot_px: None,
+};
 
 /// Screen points, with the neighbourhoods of the active and of the passive points.
 struct Case {
@@ -32,11 +39,20 @@ impl Case {
         let camera = Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
         let view = camera.view(DVec3::ZERO, [121, 90]).expect("a view");
         let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
-        let screen = Projector::default().project(&cloud, &view, &ProjectRules::usual(RULES.k)).clone();
-        let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor, adaptive: true };
+        let screen =
+            Projector::default().project(&cloud, &view, &ProjectRules::usual(RULES.k), &crate::cancel::NEVER).clone();
+        let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor, lenient: true };
         let neighborhoods = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();
-            screen_grid::search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);
+            screen_grid::search(
+                &screen,
+                queries,
+                &view,
+                &rules,
+                &Past::default(),
+                &mut neighborhoods,
+                &crate::cancel::NEVER,
+            );
             neighborhoods
         });
         Self { screen, view, neighborhoods }
@@ -53,7 +69,7 @@ impl Case {
         let mut surfels = Surfels::new();
         for (queries, neighborhoods) in [&self.screen.active, &self.screen.passive].into_iter().zip(&self.neighborhoods)
         {
-            fit(&self.screen, queries, neighborhoods, &self.view, rules, &mut surfels);
+            fit(&self.screen, queries, neighborhoods, &self.view, rules, &mut surfels, &crate::cancel::NEVER);
         }
         surfels
     }
@@ -68,8 +84,9 @@ impl Case {
             splat_scale: rules.splat_scale,
             longest: rules.longest,
             keep_outliers: rules.keep_outliers.into(),
-            adaptive: rules.adaptive.into(),
-            dot_px: rules.dot_px,
+            scan_lines: rules.scan_lines.into(),
+            compares_density: rules.compares_density.into(),
+            dot_px: rules.dot_px.unwrap_or(0.0),
             ..FrameUniform::new(&self.view, rules.k)
         };
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
@@ -98,7 +115,7 @@ fn covariance(moments: &Moments) -> DMat3 {
 
 fn compare(device: &Surfel, host: &Surfel, moments: &Moments) -> Result<(), String> {
     let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(format!("{what}: {device:?}, host: {host:?}")) };
-    let of_point = |surfel: &Surfel| (surfel.center, surfel.k_radius, surfel.pixel, surfel.source, surfel.screen);
+    let of_point = |surfel: &Surfel| (surfel.center, surfel.k_radius, surfel.pixel, surfel.source, surfel.screen());
     ensure(of_point(device) == of_point(host), "what is only copied")?;
     // Rounding of a quotient and a root.
     ensure((device.radius - host.radius).abs() <= 1e-6 * host.radius, "radius")?;
@@ -146,7 +163,7 @@ fn the_device_fits_what_the_host_fits() {
                         different += usize::from(outcome.is_err());
                         outcome.unwrap_or_else(|error| eprintln!("{name}, {projection:?}, {rules:?}: {error}"));
                     }
-                    let expected = device.iter().filter(|surfel| surfel.radius == 0.0).count();
+                    let expected = device.iter().filter(|surfel| surfel.is_dropped()).count();
                     assert_eq!(counted, expected, "{name}: outliers of both rounds are counted");
                     compared += host.len();
                     outliers += counted;
@@ -165,7 +182,7 @@ fn the_device_makes_the_dots_that_the_host_makes() {
     let passes = FitPasses::new(&gpu).expect("passes");
     for projection in [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)] {
         let case = Case::new(&test_clouds::sphere(40), projection, Some(4.0));
-        let rules = FitRules { dot_px: 7.0, ..RULES };
+        let rules = FitRules { dot_px: Some(7.0), ..RULES };
         let host = case.on_host(&rules);
         let (device, dropped) = case.on_device(&gpu, &passes, &rules);
         assert!(host.len() > 10 && dropped == 0, "{dropped} of {} are dropped", host.len());
@@ -181,7 +198,7 @@ fn the_device_makes_the_dots_that_the_host_makes() {
     }
 }
 
-/// Adaptive rules drop more points, with few neighbours and with many.
+/// Comparing with the density around drops more points, with few neighbours and with many.
 #[test]
 fn the_device_drops_what_the_host_drops() {
     let Some(gpu) = test_gpu() else { return };
@@ -191,10 +208,10 @@ fn the_device_drops_what_the_host_drops() {
     positions.extend((0..3000).map(|_| random.direction().map(|c| c * (1.0 + 0.5 * random.unit()))));
     let case = Case::new(&positions, Projection::PerspectiveFovDeg(30.0), Some(4.0));
     let plain = case.on_host(&RULES);
-    let rules = FitRules { adaptive: true, ..RULES };
+    let rules = FitRules { scan_lines: true, compares_density: true, ..RULES };
     let host = case.on_host(&rules);
     let (device, counted) = case.on_device(&gpu, &passes, &rules);
-    let is_dropped = |surfel: &Surfel| surfel.radius == 0.0;
+    let is_dropped = |surfel: &Surfel| surfel.is_dropped();
     let same = host.iter().zip(&device).filter(|(host, device)| is_dropped(host) == is_dropped(device)).count();
     assert!(host.len() - same <= 1, "{same} of {} are dropped alike", host.len());
     assert_eq!(counted, device.iter().filter(|surfel| is_dropped(surfel)).count(), "outliers are counted");
@@ -219,7 +236,7 @@ fn comparison_sees_each_kind_of_error() {
         Surfel { curvature: right.curvature + 1e-3, ..right },
         Surfel { major_ratio: 1.01 * right.major_ratio, ..right },
         Surfel { pixel: 0, ..right },
-        Surfel { screen: right.screen + 1, ..right },
+        Surfel { screen_and_flags: right.screen_and_flags + 1, ..right },
     ];
     assert_eq!(compare(&right, &right, &moments[5]), Ok(()), "nothing is wrong yet");
     for surfel in wrong {

@@ -110,15 +110,15 @@ impl Sensors {
         }
         surfels.par_chunks_mut(TASK_SURFELS).flatten_iter().for_each(|surfel| {
             let sensor = self.of(surfel.source).map(|sensor| view.view_from_world * (sensor - view.eye_local));
-            if sensor.is_some_and(|sensor| shows_back(surfel, sensor, view)) {
-                surfel.screen |= Surfel::BACK;
+            if sensor.is_some_and(|sensor| is_seen_from_behind(surfel, sensor, view)) {
+                surfel.screen_and_flags |= Surfel::BACK;
             }
         });
     }
 }
 
 /// Whether the sensor, in view space, was certainly on the other side of a surfel than the eye.
-fn shows_back(surfel: &Surfel, sensor: Vec3, view: &View) -> bool {
+fn is_seen_from_behind(surfel: &Surfel, sensor: Vec3, view: &View) -> bool {
     let [center, normal] = [surfel.center, surfel.normal].map(Vec3::from);
     let to_eye = view.to_eye(center);
     let to_sensor = sensor - center;

@@ -40,7 +40,7 @@ fn sensor_of(point: u32) -> vec3f {
     return sensors[low].position;
 }
 
-fn shows_back(surfel: Surfel, sensor: vec3f) -> bool {
+fn is_seen_from_behind(surfel: Surfel, sensor: vec3f) -> bool {
     let eye = to_eye(surfel.center);
     let to_sensor = to_view(sensor) - surfel.center;
     // Thickness of the neighbourhood over its width: about the tangent of the normal's error angle.
@@ -60,7 +60,7 @@ fn orient(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     }
     let place = first + index;
     let sensor = sensor_of(surfels[place].source);
-    if is_finite(sensor.x) && shows_back(surfels[place], sensor) {
-        surfels[place].screen |= BACK;
+    if is_finite(sensor.x) && is_seen_from_behind(surfels[place], sensor) {
+        surfels[place].screen_and_flags |= BACK;
     }
 }

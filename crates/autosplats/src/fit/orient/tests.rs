@@ -6,8 +6,9 @@ use super::gpu::{OrientPasses, sensor_buffer, write_sensors};
 use super::*;
 use crate::camera::{Camera, Projection};
 use crate::gpu::{Clock, FrameUniform, Gpu, Recorder, read_back, test_gpu};
+use crate::project::Round;
 use crate::project::gpu::tests::find_work;
-use crate::project::gpu::{Counter, Round, ScreenBuffers};
+use crate::project::gpu::{Counter, ScreenBuffers};
 use crate::test_clouds::Random;
 
 const ORIGIN: DVec3 = DVec3::new(4e5, 5e6, 100.0);
@@ -73,7 +74,7 @@ fn at_the_origin(normals: &[Vec3]) -> Vec<Surfel> {
         center: [0.0, 0.0, 10.0],
         normal: normal.normalize().to_array(),
         radius: 1.0,
-        screen: 7,
+        screen_and_flags: 7,
         ..Surfel::default()
     };
     normals.iter().map(surfel).collect()
@@ -87,7 +88,7 @@ fn only_what_is_sure_is_a_back() {
             let mut surfels = at_the_origin(normals);
             let sensors = Sensors::new(&cloud(1, vec![scan(ORIGIN + sensor, 0..1)]));
             sensors.orient(&mut surfels, &view);
-            assert!(surfels.iter().all(|surfel| surfel.screen & !Surfel::BACK == 7), "the index stays");
+            assert!(surfels.iter().all(|surfel| surfel.screen() == 7), "the index stays");
             surfels.iter().map(Surfel::shows_back).collect::<Vec<bool>>()
         };
         // In view space: towards the eye, tilted, nearly sideways, and almost exactly sideways.

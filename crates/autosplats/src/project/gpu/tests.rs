@@ -139,7 +139,7 @@ fn the_device_finds_what_the_host_finds() {
                 let rules = ProjectRules { k: K, halves, grid_culling };
                 let view = camera.view(DVec3::ZERO, size).expect("a view").with_margin(margin);
                 let mut projector = Projector::default();
-                let host = projector.project(&cloud, &view, &rules);
+                let host = projector.project(&cloud, &view, &rules, &crate::cancel::NEVER);
                 for (int64, passes) in &forms {
                     let (device, sixteenths) = project(&gpu, passes, &cloud, &view, &rules);
                     let case = format!("{name} {projection:?} {size:?} {rules:?} {int64}");

@@ -4,18 +4,20 @@ use std::mem::{Discriminant, discriminant};
 
 use crate::Error;
 use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
-use crate::camera::{PlacedView, Reprojection};
+use crate::camera::{PlacedView, Reprojection, View};
 use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::fit::orient::gpu::OrientPasses;
 use crate::gpu::{FrameUniform, Gpu, Step};
 use crate::project::DeviceCloud;
-use crate::project::gpu::{ProjectPasses, Round, ScreenBuffers};
+use crate::project::gpu::{ProjectPasses, ScreenBuffers};
 use crate::renderer::attributes::SplatAttributes;
+use crate::renderer::frame::Stage;
+use crate::renderer::rules::Rules;
 use crate::renderer::{Reconstruction, Settings};
+use crate::search::SearchEngine;
 use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers, compile};
 use crate::search::past::gpu::{PastPasses, past_buffer};
 use crate::search::screen_grid::gpu::neighborhood_buffer;
-use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ShadeBuffers, ShadePasses, ShadeUniform, finds_range};
 use crate::shade::over_time::gpu::{LastPictureBuffers, PictureOverTimePasses};
 use crate::shade::{ColorMode, linear_steps};
@@ -67,10 +69,10 @@ impl Passes {
             let Reconstruction { engine, k, .. } = settings.reconstruction;
             self.search = Some((shape.search, compile(gpu, engine, k)?));
         }
-        if shape.adaptive && self.adapt.is_none() {
+        if shape.adapt && self.adapt.is_none() {
             self.adapt = Some(AdaptPasses::new(gpu)?);
         }
-        if shape.smooth && self.over_time.is_none() {
+        if shape.average && self.over_time.is_none() {
             self.over_time = Some((OverTimePasses::new(gpu)?, PictureOverTimePasses::new(gpu)?));
         }
         if self.splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
@@ -86,12 +88,12 @@ pub(super) struct Shape {
     /// Width and height of the picture in pixels.
     size: [u32; 2],
     /// Width of the margin around the picture in pixels.
-    margin: u32,
+    margin_px: u32,
     halves: bool,
     search: SearchKind,
     coherent: bool,
-    smooth: bool,
-    adaptive: bool,
+    average: bool,
+    adapt: bool,
     depth_refinement: bool,
     trim: bool,
     channels: Channels,
@@ -108,22 +110,21 @@ impl Shape {
     /// their sensors.
     pub(super) fn new(
         size: [u32; 2],
-        margin: u32,
-        halves: bool,
+        rules: &Rules,
         sensors: Option<usize>,
         wanted: &SplatAttributes,
         Settings { reconstruction, shading, all_layers, .. }: &Settings,
     ) -> Self {
         Self {
             size,
-            margin,
-            halves,
+            margin_px: rules.margin_px,
+            halves: rules.project.halves,
             search: (discriminant(&reconstruction.engine), reconstruction.k),
-            coherent: reconstruction.starts_from_past(),
-            smooth: reconstruction.smooths(),
-            adaptive: reconstruction.adaptive,
-            depth_refinement: reconstruction.depth_refinement,
-            trim: reconstruction.trim,
+            coherent: rules.coherent,
+            average: rules.averaged.is_some(),
+            adapt: rules.adapt.is_some(),
+            depth_refinement: rules.depth_refinement,
+            trim: rules.trim.is_some(),
             channels: wanted.channels(),
             sensors,
             tone_backs: wanted.backs && shading.tones_backs(),
@@ -164,20 +165,21 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Makes buffers and steps for frames of a shape.
+    /// Makes buffers and steps for frames of a shape, which the `rules` have.
     pub(super) fn new(
         gpu: &Gpu,
         shape: Shape,
         passes: &mut Passes,
         ResidentBuffers { cloud, sensors, depth_noise, frame }: ResidentBuffers<'_>,
+        rules: &Rules,
         settings: &Settings,
     ) -> Result<Self, Error> {
         passes.compile(gpu, &shape, settings)?;
         let Passes { project, search, past, fit, orient, adapt, over_time, splat, shade } = passes;
         let (Some((_, search)), Some((_, splat))) = (search, splat) else { unreachable!("they were just compiled") };
-        let adapt = adapt.as_ref().filter(|_| shape.adaptive);
-        let Shape { size: picture_size, margin, halves, .. } = shape;
-        let size = picture_size.map(|side| side + 2 * margin);
+        let adapt = adapt.as_ref().filter(|_| shape.adapt);
+        let Shape { size: picture_size, margin_px, halves, .. } = shape;
+        let size = picture_size.map(|side| side + 2 * margin_px);
         let screen = ScreenBuffers::new(gpu, size, halves, cloud.capacity(), cloud.words())?;
         let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
         let past_radii = past_buffer(gpu, shape.coherent.then_some(size))?;
@@ -186,7 +188,7 @@ impl Prepared {
             Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
             None => None,
         };
-        let over_time = over_time.as_ref().filter(|_| shape.smooth);
+        let over_time = over_time.as_ref().filter(|_| shape.average);
         let picture_over_time = over_time.map(|(_, passes)| passes);
         let over_time = match over_time {
             Some((passes, _)) => Some((passes, OverTimeBuffers::new(gpu, screen.capacity, size)?)),
@@ -200,42 +202,68 @@ impl Prepared {
             None => None,
         };
         let (steps, convergence) = gpu.checked(|| {
-            let mut steps = project.steps(gpu, frame, cloud, &screen);
-            if let Some((passes, buffers)) = &adapt {
-                steps.extend(passes.steps_cells(gpu, frame, &screen, buffers));
-            }
             let buffers =
                 SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods, past: &past_radii };
-            let EngineSteps { rounds, convergence } = search.steps(gpu, buffers)?;
-            for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(rounds) {
-                if round == Round::Recovered {
-                    steps.extend(splat.steps_recover(gpu, frame, &screen, &splats));
+            let EngineSteps { rounds: mut searches, convergence } = search.steps(gpu, buffers)?;
+            let mut steps = Vec::new();
+            for stage in Stage::list(rules) {
+                match stage {
+                    Stage::Project => steps.extend(project.steps(gpu, frame, cloud, &screen)),
+                    Stage::FillCells => {
+                        if let Some((passes, buffers)) = &adapt {
+                            steps.extend(passes.steps_cells(gpu, frame, &screen, buffers));
+                        }
+                    }
+                    Stage::Search(round) => steps.append(&mut searches[round as usize]),
+                    Stage::Fit(round) => {
+                        steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
+                    }
+                    Stage::Adapt(round) => {
+                        if let Some((passes, buffers)) = &adapt {
+                            steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, round));
+                        }
+                    }
+                    Stage::Orient(round) => {
+                        if let (Some(orient), Some(sensors)) = (&*orient, sensors) {
+                            steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
+                        }
+                    }
+                    Stage::Average(round) => {
+                        if let Some((passes, buffers)) = &over_time {
+                            steps.push(passes.step(gpu, frame, &screen, &surfels, (&layers, buffers), round));
+                        }
+                    }
+                    Stage::Draw(round) => {
+                        steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
+                    }
+                    Stage::Recover => steps.extend(splat.steps_recover(gpu, frame, &screen, &splats)),
+                    Stage::Keep => {
+                        if shape.coherent {
+                            steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));
+                        }
+                        if let Some((passes, buffers)) = &over_time {
+                            steps.extend(passes.steps_keep(gpu, frame, &screen, &surfels, buffers));
+                        }
+                    }
+                    Stage::Layers => {
+                        let noise = adapt.as_ref().map(|(_, buffers)| buffers.noise());
+                        let rules = LayerRules { depth_refinement: shape.depth_refinement, trim: shape.trim, noise };
+                        steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, rules));
+                    }
+                    Stage::Shade => {
+                        steps.extend(shade.steps(
+                            gpu,
+                            frame,
+                            &layers,
+                            &screen.counters,
+                            &picture,
+                            &settings.shading,
+                        )?);
+                        if let Some((passes, last)) = &last_picture {
+                            steps.extend(passes.steps(gpu, frame, &layers, &picture, last));
+                        }
+                    }
                 }
-                steps.extend(search);
-                steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
-                if let Some((passes, buffers)) = &adapt {
-                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, round));
-                }
-                if let (Some(orient), Some(sensors)) = (&*orient, sensors) {
-                    steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
-                }
-                if let Some((passes, buffers)) = &over_time {
-                    steps.push(passes.step(gpu, frame, &screen, &surfels, (&layers, buffers), round));
-                }
-                steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
-            }
-            if shape.coherent {
-                steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));
-            }
-            if let Some((passes, buffers)) = &over_time {
-                steps.extend(passes.steps_keep(gpu, frame, &screen, &surfels, buffers));
-            }
-            let noise = adapt.as_ref().map(|(_, buffers)| buffers.noise());
-            let rules = LayerRules { depth_refinement: shape.depth_refinement, trim: shape.trim, noise };
-            steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, rules));
-            steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
-            if let Some((passes, last)) = &last_picture {
-                steps.extend(passes.steps(gpu, frame, &layers, &picture, last));
             }
             Ok::<_, Error>((steps, convergence))
         })??;
@@ -253,47 +281,47 @@ impl Prepared {
         gpu: &Gpu,
         frame: &wgpu::Buffer,
         (now, identity, format): (PlacedView, u64, Option<wgpu::TextureFormat>),
-        dot_px: f32,
+        rules: &Rules,
         settings: &Settings,
         shading: &ShadeUniform,
     ) {
         let Settings { reconstruction, .. } = settings;
-        let rules = SearchRules {
-            k: reconstruction.k,
-            outlier_expansions: reconstruction.outlier_expansions,
-            gap_factor: reconstruction.gap_factor,
-            adaptive: reconstruction.adaptive,
-        };
-        let frame_uniform = FrameUniform {
-            halves: self.shape.halves.into(),
-            grid_culling: reconstruction.grid_culling.into(),
-            adaptive: reconstruction.adaptive.into(),
-            longest: reconstruction.longest(),
-            keep_outliers: reconstruction.outlier_expansions.is_none().into(),
-            splat_scale: reconstruction.splat_scale,
-            dot_px,
-            outlier_growth: rules.outlier_radius(1.0),
-            gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
-            first_radius: match reconstruction.engine {
-                SearchEngine::KdTree { first_radius } => first_radius,
-                _ => 0.0,
-            },
-            ..FrameUniform::new(&now.view, reconstruction.k)
-        };
+        let frame_uniform = uniform(&now.view, rules, reconstruction.engine);
         // New steps have no last frame to look back at. A change of k always makes new steps.
-        let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.smooth);
+        let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.average);
         let reprojected = past.and_then(|(past, points, made)| Some((Reprojection::new(&now, &past)?, points, made)));
         let frame_uniform = reprojected.map_or(frame_uniform, |(past, points, made)| {
             let same_points = points == identity;
             let (before, format_before) = &made;
             let is_alike = before.reconstruction == *reconstruction;
-            let [of_same, of_others] = if is_alike { reconstruction.averaged() } else { [1; 2] };
+            let [of_same, of_others] = rules.averaged.filter(|_| is_alike).unwrap_or([1; 2]);
             let frames_averaged = if same_points { of_same } else { of_others } as f32;
-            let same_picture = self.shape.smooth && same_points && before == settings && *format_before == format;
+            let same_picture = self.shape.average && same_points && before == settings && *format_before == format;
             let (same_points, same_picture) = (same_points.into(), same_picture.into());
             FrameUniform { frames_averaged, same_points, same_picture, ..frame_uniform.after(&past) }
         });
         gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&frame_uniform));
         self.picture.write(gpu, shading, &settings.shading);
+    }
+}
+
+/// The camera and the rules of a frame, without a last frame.
+fn uniform(view: &View, rules: &Rules, engine: SearchEngine) -> FrameUniform {
+    let Rules { project, search, fit, .. } = rules;
+    let search = search.expect("planes are given on the CPU only");
+    FrameUniform {
+        halves: project.halves.into(),
+        grid_culling: project.grid_culling.into(),
+        lenient: search.lenient.into(),
+        outlier_growth: search.outlier_radius(1.0),
+        gap_growth: search.gap_factor.map_or(f32::INFINITY, f32::sqrt),
+        first_radius: if let SearchEngine::KdTree { first_radius } = engine { first_radius } else { 0.0 },
+        longest: fit.longest,
+        scan_lines: fit.scan_lines.into(),
+        keep_outliers: fit.keep_outliers.into(),
+        compares_density: fit.compares_density.into(),
+        splat_scale: fit.splat_scale,
+        dot_px: fit.dot_px.unwrap_or(0.0),
+        ..FrameUniform::new(view, project.k)
     }
 }

@@ -25,12 +25,12 @@ fn past(view: &View, k: u32, radii: &[f32]) -> Past {
 
 /// The radii that a search of this frame stores for each pixel.
 pub(crate) fn found(screen: &ScreenPoints, view: &View, k: u32) -> Vec<f32> {
-    let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, adaptive: true };
+    let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, lenient: true };
     let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
     let mut past = Past::default();
     past.begin(seen(view), k);
     let mut neighborhoods = Neighborhoods::default();
-    screen_grid::search(screen, &queries, view, &rules, &past, &mut neighborhoods);
+    screen_grid::search(screen, &queries, view, &rules, &past, &mut neighborhoods, &crate::cancel::NEVER);
     past.keep(screen, &queries, &neighborhoods);
     past.end();
     past.last.pixels.iter().map(|radius| f32::from_bits(radius.load(Ordering::Relaxed))).collect()
@@ -45,7 +45,7 @@ pub(crate) fn garbage(screen: &ScreenPoints, view: &View, k: u32, random: &mut R
 fn search(screen: &ScreenPoints, view: &View, rules: &SearchRules, past: &Past) -> (Vec<Moments>, SearchCounts) {
     let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
     let mut neighborhoods = Neighborhoods::default();
-    screen_grid::search(screen, &queries, view, rules, past, &mut neighborhoods);
+    screen_grid::search(screen, &queries, view, rules, past, &mut neighborhoods, &crate::cancel::NEVER);
     (host_moments(&neighborhoods, queries.len()), neighborhoods.counts)
 }
 
@@ -60,7 +60,7 @@ fn the_past_changes_nothing() {
             let (screen, view) = projected(&positions, &camera, SIZE, &ProjectRules::usual(k));
             let pasts = [found(&screen, &view, k), garbage(&screen, &view, k, &mut random)];
             for (e0, lambda) in [(Some(1), Some(4.0)), (Some(3), None), (None, Some(2.0)), (None, None)] {
-                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0.is_some() };
+                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient: e0.is_some() };
                 let without = search(&screen, &view, &rules, &Past::default());
                 for radii in &pasts {
                     let with = search(&screen, &view, &rules, &past(&view, k, radii));
@@ -83,7 +83,7 @@ fn the_past_changes_nothing_at_the_bound() {
         for k in [10, 64] {
             let (screen, view) = projected(&positions, &camera, [400, 300], &ProjectRules::usual(k));
             assert!(screen.points.len() > 4096, "more than are read: {}", screen.points.len());
-            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, adaptive: true };
+            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, lenient: true };
             let without = search(&screen, &view, &rules, &Past::default());
             bounded += without.1.bounded;
             for radii in [found(&screen, &view, k), garbage(&screen, &view, k, &mut random)] {

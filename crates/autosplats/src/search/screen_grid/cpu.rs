@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::window::Window;
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::project::ScreenPoints;
 use crate::search::moments::{squared_distances, sum_moments};
 use crate::search::past::{Past, Trust};
@@ -36,6 +37,7 @@ pub(crate) fn search(
     rules: &SearchRules,
     past: &Past,
     neighborhoods: &mut Neighborhoods,
+    cancel: &Cancel<'_>,
 ) {
     neighborhoods.blocks.resize(queries.len().div_ceil(LANES), NeighborhoodBlock::default());
     neighborhoods.counts = neighborhoods
@@ -43,6 +45,9 @@ pub(crate) fn search(
         .par_chunks_mut(TASK_BLOCKS)
         .zip(queries.par_chunks(TASK_BLOCKS * LANES))
         .map_init(Scratch::default, |scratch, (blocks, queries)| {
+            if cancel.is_given_up() {
+                return SearchCounts::default();
+            }
             // Tasks do not depend on the number of threads, so neither may the guesses that a task starts from.
             scratch.reach = 1.0;
             scratch.trust = Trust::default();
@@ -267,7 +272,7 @@ fn judge(task: &SearchInput, block: &Block, lane: usize, squared: &[f32], known:
 ///
 /// A gap is an annulus (b, √λ·b] without a point, with b ≥ r̃₀. Starting at b = r̃₀, the furthest point within √λ·b
 /// becomes the next b, until √λ·b reaches the k-radius. If there is no such point, there may be a gap, or no point
-/// near. Adaptive rules have no further gaps.
+/// near. Lenient rules have no further gaps.
 #[inline(always)]
 fn unruled<S: Simd>(
     simd: S,

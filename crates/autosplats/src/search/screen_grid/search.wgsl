@@ -142,7 +142,7 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> Win
 fn find(query: u32, center: vec3f, initial_radius: f32) -> SearchResult {
     let strip_px = f32(task.strip_px);
     let outlier_radius = frame.outlier_growth * initial_radius;
-    let farthest_first = select(1.0, OUTLIER_RADIUS_SLACK, frame.adaptive == 1u) * outlier_radius;
+    let farthest_first = select(1.0, OUTLIER_RADIUS_SLACK, frame.lenient == 1u) * outlier_radius;
     let likely = past_radius(center, initial_radius);
     // A radius that rounds to 0 would never grow.
     var radius = max(select(FIRST_WINDOW_SLACK * initial_radius, PAST_RADIUS_SLACK * likely, likely > 0.0), MIN_POSITIVE);

@@ -59,7 +59,7 @@
 //! wider bound, with one or two neighbours too many. A point still expanding keeps the neighbours met, if any, and
 //! counts as *bounded*. The bound on search work of [`search`](super) does not apply: a search without the outlier
 //! rule draws splats as wide as the picture. A nearest neighbour beyond the outlier radius makes an outlier with
-//! adaptive rules too, however many follow ([`OUTLIER_RADIUS_SLACK`](super::OUTLIER_RADIUS_SLACK)): channels hold the
+//! lenient rules too, however many follow ([`OUTLIER_RADIUS_SLACK`](super::OUTLIER_RADIUS_SLACK)): channels hold the
 //! furthest point of a radius, not the nearest. Distances between different points that round to 0, in clouds some
 //! 1e-19 units wide, count as 0.
 

@@ -77,7 +77,7 @@ impl Device {
 
 fn on_host(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep_linear: bool) -> Image {
     let mut image = Image::default();
-    shade(layers, scene, shading, keep_linear, None, &mut image);
+    shade(layers, scene, shading, keep_linear, None, &mut image, &crate::cancel::NEVER);
     image
 }
 

@@ -34,6 +34,8 @@ pub(super) const MIN_SEEN_WEIGHT: f32 = 0.1;
 pub(crate) struct LastPicture<M> {
     /// View and origin of the last picture, identity of its points, and its settings; `None` without a last picture.
     made: Option<(PlacedView, u64, M)>,
+    /// View of this picture into the last one; `None` if the two are not averaged.
+    past: Option<Reprojection>,
     kept: KeptPicture,
 }
 
@@ -45,7 +47,7 @@ struct KeptPicture {
     pixels: Vec<[u8; 4]>,
 }
 
-/// A picture that begins, with its view into the last one.
+/// A picture in progress, with its view into the last one.
 #[derive(Debug)]
 pub(crate) struct PictureInProgress<'a> {
     last: &'a mut KeptPicture,
@@ -56,17 +58,21 @@ pub(crate) struct PictureInProgress<'a> {
 
 impl<M> Default for LastPicture<M> {
     fn default() -> Self {
-        Self { made: None, kept: KeptPicture::default() }
+        Self { made: None, past: None, kept: KeptPicture::default() }
     }
 }
 
 impl<M: PartialEq> LastPicture<M> {
     /// Begins a picture with this view, without a margin, and these settings. The state of a picture that was given up
     /// is dropped.
-    pub(crate) fn begin(&mut self, now: PlacedView, identity: u64, made: &M) -> PictureInProgress<'_> {
+    pub(crate) fn begin(&mut self, now: PlacedView, identity: u64, made: &M) {
         let last = self.made.take().filter(|(_, points, before)| *points == identity && before == made);
-        let past = last.and_then(|(then, ..)| Reprojection::new(&now, &then));
-        PictureInProgress { last: &mut self.kept, view: now.view, past }
+        self.past = last.and_then(|(then, ..)| Reprojection::new(&now, &then));
+    }
+
+    /// The picture that began, with its view.
+    pub(crate) fn following(&mut self, view: View) -> PictureInProgress<'_> {
+        PictureInProgress { last: &mut self.kept, view, past: self.past }
     }
 
     /// Completes the picture that began.

@@ -38,7 +38,8 @@ fn wall(depth: f32) -> GBuffer {
 fn show(last: &mut LastPicture<u32>, (layers, color): (&GBuffer, [u8; 4]), seen: PlacedView, settings: u32) -> Image {
     let pixels = vec![color; (SIZE[0] * SIZE[1]) as usize];
     let mut image = Image { width: SIZE[0], height: SIZE[1], pixels, linear: Vec::new() };
-    last.begin(seen, 1, &settings).average(layers, &mut image);
+    last.begin(seen, 1, &settings);
+    last.following(seen.view).average(layers, &mut image);
     last.end(seen, 1, settings);
     image
 }

@@ -104,6 +104,7 @@ fn measure(name: &str, size: [u32; 2]) -> [Quality; 2] {
             true,
             None,
             &mut image,
+            &crate::cancel::NEVER,
         );
         image
     };

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::super::layers::COVER_BYTES;
 use super::super::tests::{ALL_DISCS, Data, Discs, sixteenths, surfels, views};
-use super::super::{Attributes, GBuffer, PointColors, Splatter, TILE_AREA};
+use super::super::{Attributes, GBuffer, PointColors, Splatter, TILE_AREA, TrimRules};
 use super::*;
 use crate::adapt::Noise;
 use crate::camera::View;
@@ -106,10 +106,10 @@ impl Scene<'_> {
         let Self { surfels, view, data, .. } = *self;
         let mut splatter = Splatter::default();
         splatter.begin(view);
-        splatter.add(&surfels[..self.active], 0, view);
-        splatter.add(surfels, self.active, view);
+        splatter.add(&surfels[..self.active], 0, view, &crate::cancel::NEVER);
+        splatter.add(surfels, self.active, view, &crate::cancel::NEVER);
         if self.refinement {
-            (0..2).for_each(|_| splatter.refine(surfels, view));
+            (0..2).for_each(|_| splatter.refine(surfels, view, &crate::cancel::NEVER));
         }
         let scalars = FieldValues::F32(data.scalars.clone());
         let color = PointColors { srgb: &data.colors, linear: &data.linear };
@@ -119,8 +119,10 @@ impl Scene<'_> {
             measures: channels.measures,
             backs: channels.backs,
         };
-        splatter.attributes(surfels, view, &attributes);
-        let layers = splatter.trim(view, &sixteenths(surfels, view), (self.noise, 0.5 / SPLAT_SCALE)).0.clone();
+        splatter.attributes(surfels, view, &attributes, &crate::cancel::NEVER);
+        let rules = TrimRules { k_radius_per_radius: 0.5 / SPLAT_SCALE };
+        splatter.trim(view, &sixteenths(surfels, view), self.noise, &rules, &crate::cancel::NEVER);
+        let layers = splatter.last().clone();
         (splatter, layers)
     }
 }
@@ -246,7 +248,7 @@ fn blurred_disc(count: u32, away_px: f32, noise_px: f32, tilt: f32, view: &View)
         surfel
     };
     let seen = (0..count).map(|_| surfel()).filter(|surfel| surfel.center[2] > 0.0);
-    seen.zip(0..).map(|(surfel, source)| Surfel { source, screen: source, ..surfel }).collect()
+    seen.zip(0..).map(|(surfel, source)| Surfel { source, screen_and_flags: source, ..surfel }).collect()
 }
 
 #[test]

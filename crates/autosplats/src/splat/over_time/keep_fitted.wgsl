@@ -24,10 +24,10 @@ fn keep_fitted(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
         return;
     }
     let surfel = surfels[index];
-    let point = points[surfel.screen & ~BACK].position_view;
+    let point = points[screen_of(surfel)].position_view;
     fitted[index] = Fitted(surfel.center - point, surfel.source, surfel.normal, frames[index]);
     let at = to_pixel(point);
-    if surfel.radius > 0.0 && all(at >= vec2f(0.0)) && all(at < vec2f(frame.size)) {
+    if !is_dropped(surfel) && all(at >= vec2f(0.0)) && all(at < vec2f(frame.size)) {
         // Rounding may put two points into one half. The maximum always keeps the same one.
         atomicMax(&halves[half_at(vec2u(4.0 * at))], index + 1u);
     }

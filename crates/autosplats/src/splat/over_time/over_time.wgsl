@@ -52,12 +52,12 @@ fn place_then(source: u32, point: vec3f) -> u32 {
 // Averages a surfel. Returns the number of frames in its mean.
 fn smoothed(place: u32) -> f32 {
     let surfel = surfels[place];
-    if !has_past() || frame.frames_averaged == 1.0 || surfel.radius == 0.0 {
+    if !has_past() || frame.frames_averaged == 1.0 || is_dropped(surfel) {
         return 1.0;
     }
     let back = transpose(frame.past_rotation);
     if frame.same_points == 1u {
-        let point = points[surfel.screen & ~BACK].position_view;
+        let point = points[screen_of(surfel)].position_view;
         let found = place_then(surfel.source, point);
         if found != 0u {
             let then = fitted[found - 1u];

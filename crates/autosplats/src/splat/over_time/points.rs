@@ -98,9 +98,8 @@ impl<M: PartialEq> OverTime<M> {
     }
 
     /// Keeps the fits of this frame; `surfels` are all of its surfels.
-    pub(crate) fn end(&mut self, now: PlacedView, identity: u64, made: M, surfels: &Surfels, screen: &ScreenPoints) {
+    pub(crate) fn keep(&mut self, surfels: &Surfels, screen: &ScreenPoints, view: &View) {
         let Self { halves, fitted, frames, .. } = self;
-        let view = &now.view;
         halves.resize_with(2 * view.width as usize * view.height as usize, AtomicU32::default);
         halves.par_chunks_mut(TASK).for_each(|halves| halves.iter_mut().for_each(|half| *half.get_mut() = 0));
         fitted.resize(surfels.len(), Fitted::default());
@@ -111,7 +110,7 @@ impl<M: PartialEq> OverTime<M> {
                 let point = point_of(surfel, screen);
                 let offset = (Vec3::from(surfel.center) - point).to_array();
                 *fitted = Fitted { offset, source: surfel.source, normal: surfel.normal, frames };
-                if surfel.radius > 0.0
+                if !surfel.is_dropped()
                     && let Some(half) = half_at(view.to_pixel(point), view)
                 {
                     // Rounding may put two points into one half. The maximum always keeps the same one.
@@ -119,6 +118,10 @@ impl<M: PartialEq> OverTime<M> {
                 }
             }
         });
+    }
+
+    /// Completes the frame that began. It is the last one for the next frame.
+    pub(crate) fn end(&mut self, now: PlacedView, identity: u64, made: M) {
         self.seen = Some((now, identity, made));
     }
 }
@@ -137,7 +140,7 @@ impl LastFrame<'_> {
     /// Averages a surfel. Returns the number of frames in its mean.
     fn smooth(&self, surfel: &mut Surfel, view: &View) -> f32 {
         let LookBack { reprojection, same_points, frames: most } = self.past;
-        if surfel.radius == 0.0 {
+        if surfel.is_dropped() {
             return 1.0;
         }
         let mut noisy = true;
@@ -177,5 +180,5 @@ impl LastFrame<'_> {
 
 /// The measured point of a surfel, view space.
 fn point_of(surfel: &Surfel, screen: &ScreenPoints) -> Vec3 {
-    screen.points[(surfel.screen & !Surfel::BACK) as usize].position_view.into()
+    screen.points[surfel.screen() as usize].position_view.into()
 }

@@ -40,7 +40,7 @@ pub(super) fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) 
     let facing = normal.dot(surfel.normal.into());
     let is_same = distance.abs() <= MAX_SURFACE_DISTANCE_RADII * surfel.k_radius
         && facing.abs() >= MIN_SURFACE_COSINE
-        && surfel.radius > 0.0;
+        && !surfel.is_dropped();
     is_same.then(|| LastSurface { normal: normal * facing.signum(), distance: distance * facing.signum() })
 }
 

@@ -28,11 +28,12 @@ use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
-use super::{EMPTY, Outline, PixelSurface, Rim, SPLAT_WINDOW_PX};
+use super::{EMPTY, Outline, Rim, SPLAT_WINDOW_PX};
 use crate::adapt::Noise;
 use crate::camera::View;
 use crate::fit::SUPPORT;
 use crate::project::Sixteenths;
+use crate::splat::layers::PixelSurface;
 use crate::splat::{TILE, tiled_index};
 
 /// Least noise in pixels that blurs a border. With less noise, detail of far views that passes for noise would be cut.

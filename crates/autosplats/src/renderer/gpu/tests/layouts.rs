@@ -58,7 +58,7 @@ fn mirrored() -> [Mirrored; 10] {
                 k,
                 halves,
                 grid_culling,
-                adaptive,
+                lenient,
                 keep_outliers,
                 splat_scale,
                 outlier_growth,
@@ -74,6 +74,8 @@ fn mirrored() -> [Mirrored; 10] {
                 past_shift,
                 past_focal_px,
                 dot_px,
+                scan_lines,
+                compares_density,
             },
             filled up with padding
         ),
@@ -85,7 +87,18 @@ fn mirrored() -> [Mirrored; 10] {
         mirrored!("ScreenPoint", ScreenPoint { position_view, pixel }),
         mirrored!(
             "Surfel",
-            Surfel { center, radius, normal, k_radius, major_axis, major_ratio, curvature, pixel, source, screen }
+            Surfel {
+                center,
+                radius,
+                normal,
+                k_radius,
+                major_axis,
+                major_ratio,
+                curvature,
+                pixel,
+                source,
+                screen_and_flags
+            }
         ),
         mirrored!("Fitted", Fitted { offset, source, normal, frames }),
         mirrored!(
@@ -255,6 +268,8 @@ fn constants_are_alike_in_rust_and_wgsl() {
     let in_wgsl: Vec<_> = constants(&pass).into_iter().filter(|entry| works.contains(entry)).collect();
     assert_eq!(in_wgsl, works, "work in WGSL, and in Rust");
 
+    let flags = ["BACK", "LINE"].map(|flag| constant("#import surfel\n", flag));
+    assert_eq!(flags, [Surfel::BACK, Surfel::LINE], "flags of a surfel");
     assert_eq!(constant("#import frame\n#import blocks\n", "BLOCK_PX"), BLOCK_PX as u32, "side of a block");
     let trim = passes().find(|pass| pass.path == "splat/trim").expect("a pass");
     assert_eq!(constant(trim.source, "FRINGE_BLOCKS"), FRINGE_BLOCKS as u32, "blocks of a fringe");

@@ -45,7 +45,8 @@ fn view(scale: f64) -> View {
 
 fn find(gpu: &Gpu, passes: &KdTreePasses, positions: &[[f32; 3]], view: &View, k: u32, first_radius: f32) -> Found {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
-    let screen: ScreenPoints = Projector::default().project(&cloud, view, &ProjectRules::usual(k)).clone();
+    let screen: ScreenPoints =
+        Projector::default().project(&cloud, view, &ProjectRules::usual(k), &crate::cancel::NEVER).clone();
     let mut device_cloud = DeviceCloud::default();
     device_cloud.resize(gpu, cloud.len()).expect("room");
     Uploader::new().positions(gpu, &cloud, &device_cloud, &|_| true).expect("an upload");

@@ -40,7 +40,7 @@ fn told(view: &View, rules: &SearchRules) -> FrameUniform {
     FrameUniform {
         outlier_growth: rules.outlier_radius(1.0),
         gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
-        adaptive: rules.adaptive.into(),
+        lenient: rules.lenient.into(),
         // A screen with one point a pixel has more room than points, which bounds window sizes safely.
         halves: 1,
         ..FrameUniform::new(view, rules.k)
@@ -127,7 +127,7 @@ pub(crate) fn projected(
 ) -> (ScreenPoints, View) {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
     let view = camera.view(DVec3::ZERO, size).expect("a view");
-    (Projector::default().project(&cloud, &view, rules).clone(), view)
+    (Projector::default().project(&cloud, &view, rules, &crate::cancel::NEVER).clone(), view)
 }
 
 /// Searches both rounds on the device. Returns the neighbourhoods, and the numbers of clamped and bounded points.
@@ -158,7 +158,7 @@ pub(crate) fn on_host(screen: &ScreenPoints, view: &View, rules: &SearchRules) -
     let mut counted = [0; 2];
     for queries in [&screen.active, &screen.passive] {
         let mut neighborhoods = Neighborhoods::default();
-        screen_grid::search(screen, queries, view, rules, &Past::default(), &mut neighborhoods);
+        screen_grid::search(screen, queries, view, rules, &Past::default(), &mut neighborhoods, &crate::cancel::NEVER);
         all.extend(host_moments(&neighborhoods, queries.len()));
         counted[0] += neighborhoods.counts.clamped;
         counted[1] += neighborhoods.counts.bounded;
@@ -176,7 +176,7 @@ fn the_device_finds_what_the_host_finds() {
             let sized = |size| test_clouds::all(4000).into_iter().map(move |(name, cloud)| (name, cloud, size));
             for (name, positions, size) in [[121, 90], [300, 2], [1, 1]].into_iter().flat_map(sized) {
                 let (screen, view) = screen(&positions, &camera, size, k);
-                for (e0, lambda, adaptive) in [
+                for (e0, lambda, lenient) in [
                     (Some(3), Some(4.0), true),
                     (Some(0), Some(4.0), true),
                     (Some(1), Some(4.0), false),
@@ -184,7 +184,7 @@ fn the_device_finds_what_the_host_finds() {
                     (None, Some(2.0), false),
                     (None, None, false),
                 ] {
-                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive };
+                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient };
                     let case = format!("{name}, {size:?}, {:?}, {rules:?}", camera.projection);
                     let (host, counted_by_host) = on_host(&screen, &view, &rules);
                     for (form, passes) in &forms {
@@ -215,7 +215,7 @@ fn the_device_finds_what_the_host_finds() {
 #[test]
 fn comparison_sees_each_kind_of_error() {
     let (screen, view) = screen(&test_clouds::edge(4000), &cameras()[0], [121, 90], 10);
-    let rules = SearchRules { k: 10, outlier_expansions: Some(1), gap_factor: Some(4.0), adaptive: true };
+    let rules = SearchRules { k: 10, outlier_expansions: Some(1), gap_factor: Some(4.0), lenient: true };
     let right = on_host(&screen, &view, &rules).0[5];
     let [mut offset, mut second] = [right; 2];
     offset.offset[1] += 1e-4 * right.k_radius;
@@ -238,7 +238,7 @@ fn bounded_searches_stay_exact_as_far_as_they_go() {
     let Some(gpu) = test_gpu() else { return };
     for (k, count) in [(10, 60_000), (64, 30_000)] {
         let (screen, view) = screen(&test_clouds::outliers(count), &cameras()[1], [400, 400], k);
-        let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, adaptive: true };
+        let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, lenient: true };
         let passes = SearchPasses::new(&gpu, k).expect("passes");
         let (found, [clamped, bounded]) = on_device(&gpu, &passes, &screen, &view, &rules, None);
         let queries = [&screen.active[..], &screen.passive].concat();
@@ -270,7 +270,7 @@ fn crowded_small_pictures_are_bounded_alike() {
         for k in [10, 64] {
             let (screen, view) = screen(&positions, &cameras()[1], size, k);
             assert!(screen.points.len() > 4096, "{size:?}: {} screen points", screen.points.len());
-            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, adaptive: true };
+            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, lenient: true };
             let counted = on_host(&screen, &view, &rules).1;
             for (form, passes) in forms(&gpu, k) {
                 let found = on_device(&gpu, &passes, &screen, &view, &rules, None).1;
@@ -291,7 +291,7 @@ fn huge_coordinates_reach_no_sum() {
             let forward = (EYE / EYE.z).as_vec3();
             positions.extend((0..huge).map(|i| (forward * (1e38 * (1.0 + 0.01 * i as f32))).to_array()));
             let (screen, view) = screen(&positions, &cameras()[1], [90, 70], k);
-            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, adaptive: true };
+            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, lenient: true };
             let (host, counted) = on_host(&screen, &view, &rules);
             assert_eq!(on_device(&gpu, &passes, &screen, &view, &rules, None).1, counted, "{near} + {huge}, k = {k}");
             for (device, host) in on_device(&gpu, &passes, &screen, &view, &rules, None).0.iter().zip(&host) {
@@ -321,7 +321,7 @@ fn tall_pictures_are_searched_to_the_end() {
         for k in [10, 64] {
             let (screen, view) = screen(&positions, &camera, size, k);
             for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
-                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
+                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient: e0 == Some(3) };
                 let (host, counted_by_host) = on_host(&screen, &view, &rules);
                 for (form, passes) in forms(&gpu, k) {
                     let case = format!("{form}, {name}, {rules:?}");
@@ -358,7 +358,7 @@ fn all_at_the_same_distance_are_neighbours() {
         let is_middle = |&query: &u32| screen.points[query as usize].position_view[..2] == [0.0, 0.0];
         let middle = queries.iter().position(is_middle).expect("the middle");
         for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
-            let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
+            let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient: e0 == Some(3) };
             let (host, _) = on_host(&screen, &view, &rules);
             assert!(lambda.is_some() || host[middle].count > 100.0, "{rules:?}: {:?}", host[middle]);
             for (form, passes) in forms(&gpu, k) {
@@ -382,7 +382,7 @@ fn the_past_changes_nothing() {
             let (screen, view) = screen(&positions, &cameras()[0], [121, 90], k);
             let pasts = [past::tests::found(&screen, &view, k), past::tests::garbage(&screen, &view, k, &mut random)];
             for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
-                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
+                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient: e0 == Some(3) };
                 for (form, passes) in &forms {
                     let without = on_device(&gpu, passes, &screen, &view, &rules, None);
                     for radii in &pasts {

@@ -63,7 +63,7 @@ fn on_device(
 }
 
 fn rules(k: u32) -> SearchRules {
-    SearchRules { k, outlier_expansions: Some(1), gap_factor: Some(4.0), adaptive: true }
+    SearchRules { k, outlier_expansions: Some(1), gap_factor: Some(4.0), lenient: true }
 }
 
 /// Number of points whose neighbourhood differs from the host's, which is exact.
@@ -88,7 +88,7 @@ fn all_but_a_thousandth_is_what_the_host_finds() {
             for (name, positions) in test_clouds::all(2000) {
                 let (screen, view) = screen(&positions, &camera, SIZE, k);
                 for (e0, lambda) in [(Some(1), Some(4.0)), (Some(3), Some(4.0)), (Some(3), None), (None, Some(2.0))] {
-                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
+                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient: e0 == Some(3) };
                     let case = format!("{name}, {:?}, {rules:?}", camera.projection);
                     let (host, [clamped, _]) = on_host(&screen, &view, &rules);
                     let found = on_device(&gpu, &passes, &screen, &view, &rules);
@@ -119,7 +119,7 @@ fn short_steps_and_far_outliers() {
     for (e0, lambda) in [(Some(1), 1.1), (Some(8), 1.1), (None, 1.1), (Some(8), 4.0), (None, 4.0)] {
         for (name, positions) in test_clouds::all(2000) {
             let (screen, view) = screen(&positions, &cameras()[0], SIZE, 10);
-            let rules = SearchRules { k: 10, outlier_expansions: e0, gap_factor: Some(lambda), adaptive: true };
+            let rules = SearchRules { k: 10, outlier_expansions: e0, gap_factor: Some(lambda), lenient: true };
             let case = format!("{name}, {rules:?}");
             let host = on_host(&screen, &view, &rules).0;
             let found = on_device(&gpu, &passes, &screen, &view, &rules);
