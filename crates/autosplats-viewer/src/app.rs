@@ -1,31 +1,21 @@
 //! The application: its state, and the work of each window frame.
 
-use std::collections::HashMap;
-use std::path::PathBuf;
 use std::sync::Arc;
 
+use autosplats::Camera;
 use autosplats::cloud::Axes;
 use autosplats::cloud::glam::DVec3;
-use autosplats::{AdapterSummary, Camera};
 use eframe::egui;
 
-use crate::commands::Tool;
-use crate::document::{History, LayerId, ShownCloud};
-use crate::editing::CachedCounts;
-use crate::glance::FirstLook;
+use crate::document::ShownCloud;
 use crate::kept::StoredInput;
-use crate::loading::{Appearance, Input, JobId, Loader, Watch};
 use crate::look::Look;
-use crate::messages::Messages;
-use crate::navigation::{Flight, Navigation};
-use crate::panels::Panels;
-use crate::playing::Playing;
-use crate::rate::Rate;
-use crate::recording::Recording;
-use crate::render::{Answer, Outcome, Picture, Purpose, RenderRequest, RenderThread, Task};
+use crate::navigation::Flight;
+use crate::render::{Answer, Outcome, Purpose, RenderRequest, Task};
+use crate::session::Session;
 use crate::state::State;
-use crate::tools::Tools;
-use crate::turns::Turns;
+use crate::ui::Ui;
+use crate::view::View;
 use crate::{Options, keys, output, panels, storage, viewport};
 
 /// Seconds from the last movement until the whole picture is rendered.
@@ -33,75 +23,14 @@ const REST_DELAY_S: f64 = 0.12;
 
 /// The state of the viewer.
 pub(crate) struct App {
-    pub(crate) history: History,
-    pub(crate) loader: Loader,
-    pub(crate) playing: Playing,
-    /// The layer that receives the points of a job, once the layer exists.
-    pub(crate) loading: HashMap<JobId, LayerId>,
-    pub(crate) render: RenderThread,
-    pub(crate) navigation: Navigation,
-    pub(crate) look: Look,
-    pub(crate) tool: Tool,
-    pub(crate) tools: Tools,
-    pub(crate) panels: Panels,
-    pub(crate) messages: Messages,
-    /// The last picture.
-    pub(crate) shot: Option<Box<Picture>>,
-    pub(crate) device: Option<AdapterSummary>,
-    /// The up axis that the user chose; `None` uses the guessed one.
-    pub(crate) up_axis: Option<Axes>,
-    pub(crate) rate: Rate,
-    /// Width over height of the picture in the window.
-    pub(crate) aspect: f64,
-    /// The picture's rectangle in the window, screen points.
-    pub(crate) view_rect: egui::Rect,
-    /// Recently opened inputs, newest first.
-    pub(crate) recent: Vec<StoredInput>,
-    /// File of the session, written on exit.
-    pub(crate) state: Option<PathBuf>,
-    /// Whether files are read again when they change.
-    pub(crate) watch: bool,
-    pub(crate) watches: HashMap<PathBuf, Watch>,
-    /// The input that each layer was read from.
-    pub(crate) inputs: HashMap<LayerId, Input>,
-    /// How each input that is being read will be shown.
-    pub(crate) appearances: HashMap<JobId, Appearance>,
-    /// Jobs that read a file again, and the layer that receives the points.
-    pub(crate) reloads: HashMap<JobId, LayerId>,
-    pub(crate) guessed_axes: Option<Axes>,
-    /// What the reading thread found about the only open input, and the document version that this holds for.
-    pub(crate) glance: Option<(u64, FirstLook)>,
-    /// The camera that the program chose by itself, and the picture's width over height at the time. Until the user
-    /// moves, a new camera is chosen when points arrive or the picture changes its shape.
-    pub(crate) first_camera: Option<(Camera, f64)>,
-    /// Version of the document; every change increases it.
-    pub(crate) version: u64,
-    pub(crate) counted: CachedCounts,
-    /// What the last requested picture shows.
-    wished: Option<RequestKey>,
-    /// Whether the last requested picture is still to come.
-    awaited: bool,
-    /// Whether a camera was given, so that the first input is not fitted into the picture.
-    pub(crate) camera_given: bool,
-    /// Inputs that could not be read. A session keeps them.
-    pub(crate) failed: Vec<(Input, Appearance)>,
-    /// Whether a film preview has moved the view since the last window frame.
-    moved_by_preview: bool,
-    /// Time of the last movement, seconds.
-    moved: f64,
-    pub(crate) quit: bool,
-    /// Key cameras of a film.
-    pub(crate) keys: Vec<Camera>,
-    pub(crate) recording: Option<Recording>,
-    /// Pixel format of the window; `None` without a device, and then no picture is drawn in the window.
-    pub(crate) format: Option<eframe::wgpu::TextureFormat>,
-    /// Present if the CPU draws the window, and so competes with rendering.
-    pub(crate) turns: Option<Turns>,
+    pub(crate) session: Session,
+    pub(crate) view: View,
+    pub(crate) ui: Ui,
 }
 
 /// Everything that a picture depends on.
 #[derive(Clone, PartialEq)]
-struct RequestKey {
+pub(crate) struct RequestKey {
     version: u64,
     camera: Camera,
     size: [u32; 2],
@@ -115,49 +44,12 @@ impl App {
     /// Creates the application and starts to read the inputs of `options`. `context` belongs to the window.
     pub(crate) fn new(options: Options, look: Look, recent: Vec<StoredInput>, context: &egui::Context) -> Self {
         let mut app = Self {
-            history: History::default(),
-            loader: Loader::start(context.clone()),
-            playing: Playing::default(),
-            loading: HashMap::new(),
-            render: RenderThread::start(context.clone()),
-            navigation: Navigation::new(),
-            look,
-            tool: Tool::default(),
-            tools: Tools::default(),
-            panels: Panels::default(),
-            messages: Messages::new(context.clone()),
-            shot: None,
-            device: None,
-            up_axis: None,
-            rate: Rate::default(),
-            aspect: 1.5,
-            view_rect: egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(800.0, 600.0)),
-            recent,
-            state: options.state,
-            appearances: HashMap::new(),
-            watch: options.watch,
-            watches: HashMap::new(),
-            inputs: HashMap::new(),
-            reloads: HashMap::new(),
-            guessed_axes: None,
-            glance: None,
-            first_camera: None,
-            version: 1,
-            counted: CachedCounts::default(),
-            wished: None,
-            awaited: false,
-            camera_given: false,
-            failed: Vec::new(),
-            moved_by_preview: false,
-            moved: 0.0,
-            quit: false,
-            keys: Vec::new(),
-            recording: None,
-            format: None,
-            turns: None,
+            session: Session::new(options.state, options.watch, recent, context),
+            view: View::new(look, context),
+            ui: Ui::new(context),
         };
         if let Some(backend) = options.backend {
-            app.look.backend = backend;
+            app.view.look.backend = backend;
         }
         options.inputs.into_iter().for_each(|input| app.open(input));
         app
@@ -165,12 +57,12 @@ impl App {
 
     /// Notes that the view moves, so that pictures are rendered within the time limit.
     pub(crate) fn note_movement(&mut self) {
-        self.moved_by_preview = true;
+        self.view.moved_by_preview = true;
     }
 
     /// The up axis: as chosen, else as guessed, else Z.
     pub(crate) fn axes(&self) -> Axes {
-        self.up_axis.or(self.guessed_axes).unwrap_or(Axes::ZUp)
+        self.session.up_axis.or(self.session.guessed_axes).unwrap_or(Axes::ZUp)
     }
 
     /// Unit vector upward, world space.
@@ -184,7 +76,7 @@ impl App {
 
     /// The points of the last picture, if they still match the document.
     pub(crate) fn shown(&self) -> Option<Arc<ShownCloud>> {
-        let shown = &self.shot.as_ref()?.shown;
+        let shown = &self.view.shot.as_ref()?.shown;
         shown.shows(self.document()).then(|| Arc::clone(shown))
     }
 
@@ -193,7 +85,7 @@ impl App {
         self.follow_files();
         self.follow_streams(context);
         let now = context.input(|input| input.time);
-        let answers: Vec<_> = self.render.answers().collect();
+        let answers: Vec<_> = self.view.render.answers().collect();
         for answer in answers {
             self.take(answer, now);
         }
@@ -201,24 +93,24 @@ impl App {
 
     /// Receives the result of a picture or a task.
     fn take(&mut self, answer: Answer, now: f64) {
-        self.awaited &= matches!(answer, Answer::Finer(_) | Answer::Device(_) | Answer::Done(_));
+        self.view.awaited &= matches!(answer, Answer::Finer(_) | Answer::Device(_) | Answer::Done(_));
         match answer {
             Answer::Picture(picture) => {
-                self.rate.count(now, &picture);
-                self.messages.forget_failure();
-                self.shot = Some(picture);
+                self.view.rate.count(now, &picture);
+                self.ui.messages.forget_failure();
+                self.view.shot = Some(picture);
             }
             Answer::Finer(image) => {
-                if let Some(shot) = &mut self.shot {
+                if let Some(shot) = &mut self.view.shot {
                     shot.image = image;
                 }
             }
-            Answer::Empty => self.shot = None,
-            Answer::Device(device) => self.device = device,
+            Answer::Empty => self.view.shot = None,
+            Answer::Device(device) => self.view.device = device,
             Answer::Failed(why) => {
                 // The failed picture may belong to the film.
-                output::stop(&mut self.recording);
-                self.messages.failure(why);
+                output::stop(&mut self.view.recording);
+                self.ui.messages.failure(why);
             }
             Answer::Done(outcome) => self.done(outcome),
         }
@@ -229,7 +121,7 @@ impl App {
         match outcome {
             Outcome::Picked { purpose: Purpose::Pivot, point } => {
                 if let Some(seen) = point {
-                    self.navigation.set_pivot(seen.surface);
+                    self.view.navigation.set_pivot(seen.surface);
                 }
             }
             Outcome::Picked { purpose, point } => self.picked(purpose, point),
@@ -244,50 +136,50 @@ impl App {
     pub(crate) fn wish(&self, size: [u32; 2], moving: bool) -> RenderRequest {
         RenderRequest {
             document: self.document().clone(),
-            camera: self.navigation.camera(),
+            camera: self.view.navigation.camera(),
             size,
-            settings: self.look.settings.clone(),
-            dots: self.look.dots.then_some(self.look.dot_size),
-            backend: self.look.backend,
+            settings: self.view.look.settings.clone(),
+            dots: self.view.look.dots.then_some(self.view.look.dot_size),
+            backend: self.view.look.backend,
             // A playing input keeps one up axis; a guess per frame could change from frame to frame.
-            axes: self.up_axis.or(self.guessed_axes.filter(|_| !self.playing.is_empty())),
+            axes: self.session.up_axis.or(self.session.guessed_axes.filter(|_| !self.session.playing.is_empty())),
             budget_ms: self.shared_budget_ms(moving).map(|shared_budget_ms| {
-                self.turns.as_ref().map_or(shared_budget_ms, |turns| turns.budget_ms(shared_budget_ms))
+                self.view.turns.as_ref().map_or(shared_budget_ms, |turns| turns.budget_ms(shared_budget_ms))
             }),
         }
     }
 
     /// Milliseconds for a picture and a window frame together, while the view moves or an input plays; `None` at rest.
     fn shared_budget_ms(&self, moving: bool) -> Option<f64> {
-        let least_ms = self.look.moving_ms;
-        if moving { Some(least_ms) } else { self.playing.frame_ms(least_ms) }
+        let least_ms = self.view.look.moving_ms;
+        if moving { Some(least_ms) } else { self.session.playing.frame_ms(least_ms) }
     }
 
     /// Requests a picture if anything that it depends on has changed.
     pub(crate) fn ask(&mut self, context: &egui::Context, size: [u32; 2], busy: bool) {
         let (now, seconds) = context.input(|input| (input.time, f64::from(input.stable_dt)));
         let flight = if context.egui_wants_keyboard_input() { Flight::default() } else { flight(context) };
-        let busy = busy || std::mem::take(&mut self.moved_by_preview);
-        self.loader.frame.set(self.frame());
-        if self.navigation.advance(seconds, flight) || busy {
-            self.moved = now;
+        let busy = busy || std::mem::take(&mut self.view.moved_by_preview);
+        self.session.loader.frame.set(self.frame());
+        if self.view.navigation.advance(seconds, flight) || busy {
+            self.view.moved = now;
         }
-        if self.first_camera.is_some_and(|(_, aspect)| aspect != self.aspect) && self.is_first_view() {
+        if self.view.first_camera.is_some_and(|(_, aspect)| aspect != self.view.aspect) && self.is_first_view() {
             self.first_view();
         }
-        let moving = now - self.moved < REST_DELAY_S;
+        let moving = now - self.view.moved < REST_DELAY_S;
         if moving {
             context.request_repaint();
         }
         if self.document().layers.is_empty() {
-            self.shot = None;
-            if self.wished.take().is_some() {
+            self.view.shot = None;
+            if self.view.wished.take().is_some() {
                 // An empty document frees the points that the renderer holds.
-                self.render.wish(self.wish(size, false));
+                self.view.render.wish(self.wish(size, false));
             }
             return;
         }
-        let mut look = self.look.clone();
+        let mut look = self.view.look.clone();
         // The window draws the legend itself, so that its size stays the same in coarse pictures.
         look.settings.shading.legend = false;
         // Without averaging, noise would differ from picture to picture.
@@ -296,28 +188,29 @@ impl App {
             // A picture at rest shows its own points only, without the coarser pictures before it.
             look.settings.reconstruction.frames_averaged = 1;
         }
-        let (version, camera, axes) = (self.version, self.navigation.camera(), self.axes());
+        let (version, camera, axes) = (self.session.version, self.view.navigation.camera(), self.axes());
         let hurried = self.shared_budget_ms(moving).is_some();
         let key = RequestKey { version, camera, size, look, axes, hurried };
-        if self.wished.as_ref() != Some(&key) {
-            self.render.wish(RenderRequest { settings: key.look.settings.clone(), ..self.wish(size, moving) });
-            self.wished = Some(key);
-            self.awaited = true;
+        if self.view.wished.as_ref() != Some(&key) {
+            self.view.render.wish(RenderRequest { settings: key.look.settings.clone(), ..self.wish(size, moving) });
+            self.view.wished = Some(key);
+            self.view.awaited = true;
         }
     }
 
     /// Waits for the requested picture, if the window and the pictures take turns.
     fn take_turns(&mut self, context: &egui::Context) {
-        let Some(turns) = &mut self.turns else { return };
+        let Some(turns) = &mut self.view.turns else { return };
         turns.begin();
         let now = context.input(|input| input.time);
-        let shared_budget_ms = self.shared_budget_ms(now - self.moved < REST_DELAY_S).filter(|_| self.awaited);
+        let shared_budget_ms =
+            self.shared_budget_ms(now - self.view.moved < REST_DELAY_S).filter(|_| self.view.awaited);
         let longest =
-            shared_budget_ms.and_then(|shared_budget_ms| Some(self.turns.as_ref()?.longest(shared_budget_ms)));
-        if let Some(answer) = longest.and_then(|longest| self.render.answer_within(longest)) {
+            shared_budget_ms.and_then(|shared_budget_ms| Some(self.view.turns.as_ref()?.longest(shared_budget_ms)));
+        if let Some(answer) = longest.and_then(|longest| self.view.render.answer_within(longest)) {
             self.take(answer, now);
         }
-        if let Some(turns) = &mut self.turns {
+        if let Some(turns) = &mut self.view.turns {
             turns.end();
         }
     }
@@ -325,7 +218,7 @@ impl App {
     /// Requests the point at a pixel of the picture.
     pub(crate) fn pick(&mut self, size: [u32; 2], pixel: [f32; 2], purpose: Purpose) {
         let wish = Box::new(self.wish(size, false).of_points());
-        self.render.task(Task::Pick { wish, pixel, purpose });
+        self.view.render.task(Task::Pick { wish, pixel, purpose });
     }
 }
 
@@ -362,7 +255,7 @@ impl eframe::App for App {
         panels::over(self, &context);
         output::record(self);
         self.take_turns(&context);
-        if self.quit {
+        if self.ui.quit {
             context.send_viewport_cmd(egui::ViewportCommand::Close);
         }
     }
@@ -372,7 +265,7 @@ impl eframe::App for App {
     }
 
     fn on_exit(&mut self) {
-        if let Some(path) = &self.state
+        if let Some(path) = &self.session.file
             && let Err(error) = State::of(self).write(path)
         {
             eprintln!("error: {error}");

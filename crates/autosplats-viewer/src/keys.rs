@@ -18,7 +18,7 @@ fn is_behind(context: &egui::Context) -> bool {
 /// Takes keys before egui does, which uses some of them itself. F6 moves the focus between parts of the window. Tab
 /// moves between controls; while no control has the focus, Tab switches between points and surface.
 pub(crate) fn claim(app: &mut App, context: &egui::Context, input: &mut egui::RawInput) {
-    app.panels.left = false;
+    app.ui.panels.left = false;
     if is_behind(context) {
         return;
     }
@@ -30,15 +30,15 @@ pub(crate) fn claim(app: &mut App, context: &egui::Context, input: &mut egui::Ra
             Key::F6 if modifiers.shift_only() => Command::PreviousPart,
             Key::Tab if modifiers.is_none() && !focused => Command::Dots,
             _ => {
-                app.panels.focus.by_keys |= *key == Key::Tab;
-                app.panels.entered |= *pressed && *key == Key::Enter && modifiers.is_none() && !focused;
+                app.ui.panels.focus.by_keys |= *key == Key::Tab;
+                app.ui.panels.entered |= *pressed && *key == Key::Enter && modifiers.is_none() && !focused;
                 // Escape in a panel only returns the focus to the picture; in a dialog it closes the dialog.
-                app.panels.left |= *pressed && *key == Key::Escape && focused && !app.panels.has_window();
+                app.ui.panels.left |= *pressed && *key == Key::Escape && focused && !app.ui.panels.has_window();
                 return true;
             }
         };
         if *pressed {
-            app.panels.claimed.push(command);
+            app.ui.panels.claimed.push(command);
         }
         false
     });
@@ -46,7 +46,7 @@ pub(crate) fn claim(app: &mut App, context: &egui::Context, input: &mut egui::Ra
 
 /// Runs the commands of the keys that were pressed.
 pub(crate) fn perform(app: &mut App, context: &egui::Context) {
-    for command in std::mem::take(&mut app.panels.claimed) {
+    for command in std::mem::take(&mut app.ui.panels.claimed) {
         run(app, context, command);
     }
     dropped(app, context);
@@ -76,7 +76,7 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
             2 - u8::from(modifiers.shift) - u8::from(modifiers.command)
         });
         let clipboard = [Command::CopyView, Command::PasteView];
-        let left = app.panels.left;
+        let left = app.ui.panels.left;
         let wanted = |command: &Command| !(clipboard.contains(command) || left && *command == Command::SelectNone);
         let hit = |command: &Command| command.shortcut().is_some_and(|shortcut| input.consume_shortcut(&shortcut));
         let mut pressed: Vec<_> = commands.into_iter().filter(wanted).filter(hit).collect();
@@ -87,11 +87,11 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
         if input.consume_key(Modifiers::COMMAND, Key::Y) {
             pressed.push(Command::Redo);
         }
-        if input.consume_key(Modifiers::NONE, Key::Backspace) && app.tools.measured.pop().is_none() {
+        if input.consume_key(Modifiers::NONE, Key::Backspace) && app.ui.tools.measured.pop().is_none() {
             pressed.push(Command::DeleteSelected);
         }
         // During a drag only Escape works, which cancels the drag.
-        pressed.retain(|command| *command == Command::SelectNone || !app.tools.gizmo.is_dragging());
+        pressed.retain(|command| *command == Command::SelectNone || !app.ui.tools.gizmo.is_dragging());
         pressed
     });
     pressed.into_iter().for_each(|command| run(app, context, command));
@@ -103,7 +103,7 @@ fn dropped(app: &mut App, context: &egui::Context) {
     for file in files {
         match crate::files::dropped(&*file) {
             Some(path) => app.open(Input::file(path)),
-            None => app.messages.error(format!("{}: a dropped file needs a path", file.path().display())),
+            None => app.ui.messages.error(format!("{}: a dropped file needs a path", file.path().display())),
         }
     }
 }
@@ -111,7 +111,7 @@ fn dropped(app: &mut App, context: &egui::Context) {
 /// Runs a command.
 pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
     match command {
-        Command::Open => app.panels.dialogs.open(context),
+        Command::Open => app.ui.panels.dialogs.open(context),
         Command::Export => panels::ask_for_export(app),
         Command::Screenshot => panels::ask_for_picture(app),
         Command::Film => panels::toggle_film(app),
@@ -119,20 +119,20 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::CloseAll => {
             if app.document().layers.is_empty() {
                 // Nothing can be undone, but inputs that are being read are cancelled.
-                app.loader.cancel_all();
-                app.playing.give_up_waiting();
+                app.session.loader.cancel_all();
+                app.session.playing.give_up_waiting();
             } else {
                 panels::close_all(app);
             }
         }
         Command::Quit => context.send_viewport_cmd(egui::ViewportCommand::Close),
         Command::Undo => match app.undo() {
-            Some(label) => app.messages.note(format!("Undone: {label}")),
-            None => app.messages.note("There is nothing to undo"),
+            Some(label) => app.ui.messages.note(format!("Undone: {label}")),
+            None => app.ui.messages.note("There is nothing to undo"),
         },
         Command::Redo => match app.redo() {
-            Some(label) => app.messages.note(format!("Redone: {label}")),
-            None => app.messages.note("There is nothing to redo"),
+            Some(label) => app.ui.messages.note(format!("Redone: {label}")),
+            None => app.ui.messages.note("There is nothing to redo"),
         },
         Command::SelectAll | Command::InvertSelection => {
             if let Some(shown) = app.shown() {
@@ -147,14 +147,14 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         }
         Command::SelectNone => {
             // Each Escape undoes one step: a drag, an open window, what the tool holds, the tool, the selection.
-            let dragged = crate::gizmo::cancel(app) || app.tools.cancel_drag();
-            if dragged || app.panels.close_window() || app.tools.cancel() {
+            let dragged = crate::gizmo::cancel(app) || app.ui.tools.cancel_drag();
+            if dragged || app.ui.panels.close_window() || app.ui.tools.cancel() {
                 return;
             }
-            if app.tool == Tool::Navigate {
+            if app.ui.tool == Tool::Navigate {
                 app.change(|document| document.select_none());
             }
-            app.tool = Tool::Navigate;
+            app.ui.tool = Tool::Navigate;
         }
         Command::HideSelected => app.edit_points("Hide", |document| document.hide_selected()),
         Command::ShowAll => app.edit_points("Show", |document| document.show_all()),
@@ -173,12 +173,12 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::View(ViewDirection::Auto) => app.first_view(),
         Command::View(direction) => app.look_from(direction, false),
         Command::OppositeView => {
-            let camera = opposite(&app.navigation.goal_camera(), app.up());
-            app.navigation.go_to(&camera, false);
+            let camera = opposite(&app.view.navigation.goal_camera(), app.up());
+            app.view.navigation.go_to(&camera, false);
         }
-        Command::Projection => app.navigation.toggle_projection(),
+        Command::Projection => app.view.navigation.toggle_projection(),
         Command::UpAxis => {
-            app.up_axis = match app.up_axis {
+            app.session.up_axis = match app.session.up_axis {
                 None => Some(Axes::ZUp),
                 Some(Axes::ZUp) => Some(Axes::YUp),
                 Some(Axes::YUp) => Some(Axes::Camera),
@@ -186,33 +186,33 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
             };
             app.look_from(ViewDirection::Iso, false);
         }
-        Command::Level => app.navigation.level(),
+        Command::Level => app.view.navigation.level(),
         Command::CopyView => {
-            let camera = app.navigation.goal_camera();
+            let camera = app.view.navigation.goal_camera();
             match serde_json::to_string_pretty(&camera) {
                 Ok(text) => {
                     context.copy_text(text);
-                    app.messages.note("The view was copied; 'autosplats render --camera' accepts it too");
+                    app.ui.messages.note("The view was copied; 'autosplats render --camera' accepts it too");
                 }
-                Err(error) => app.messages.error(error.to_string()),
+                Err(error) => app.ui.messages.error(error.to_string()),
             }
         }
         Command::PasteView => context.send_viewport_cmd(egui::ViewportCommand::RequestPaste),
-        Command::Dots => app.look.dots = !app.look.dots,
+        Command::Dots => app.view.look.dots = !app.view.look.dots,
         Command::Play => app.toggle_playing(),
-        Command::StepBack => app.playing.step(false),
-        Command::StepForward => app.playing.step(true),
-        Command::PlayFromHere => app.playing.clock.begin_here(),
-        Command::PlayToHere => app.playing.clock.end_here(),
-        Command::Inputs => app.panels.inputs = !app.panels.inputs,
-        Command::Look => app.panels.look = !app.panels.look,
-        Command::Statistics => app.panels.statistics = !app.panels.statistics,
-        Command::Help => app.panels.help = !app.panels.help,
+        Command::StepBack => app.session.playing.step(false),
+        Command::StepForward => app.session.playing.step(true),
+        Command::PlayFromHere => app.session.playing.clock.begin_here(),
+        Command::PlayToHere => app.session.playing.clock.end_here(),
+        Command::Inputs => app.ui.panels.inputs = !app.ui.panels.inputs,
+        Command::Look => app.ui.panels.look = !app.ui.panels.look,
+        Command::Statistics => app.ui.panels.statistics = !app.ui.panels.statistics,
+        Command::Help => app.ui.panels.help = !app.ui.panels.help,
         Command::NextPart => panels::focus_next_part(app, context, false),
         Command::PreviousPart => panels::focus_next_part(app, context, true),
         Command::Tool(tool) => {
-            app.tools.cancel();
-            app.tool = tool;
+            app.ui.tools.cancel();
+            app.ui.tool = tool;
         }
     }
 }
@@ -234,10 +234,10 @@ fn opposite(camera: &Camera, up: DVec3) -> Camera {
 fn paste_view(app: &mut App, text: &str) {
     match serde_json::from_str::<Camera>(text).map_err(|error| error.to_string()) {
         Ok(camera) => match camera.check() {
-            Ok(()) => app.navigation.go_to(&camera, false),
-            Err(error) => app.messages.error(format!("The copied view is invalid: {error}")),
+            Ok(()) => app.view.navigation.go_to(&camera, false),
+            Err(error) => app.ui.messages.error(format!("The copied view is invalid: {error}")),
         },
-        Err(_) => app.messages.note("The clipboard holds no view; Copy view puts one there"),
+        Err(_) => app.ui.messages.note("The clipboard holds no view; Copy view puts one there"),
     }
 }
 

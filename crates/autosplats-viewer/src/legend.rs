@@ -18,8 +18,8 @@ const BAR_SEGMENTS: u16 = 64;
 
 /// Draws the legend at the right edge, if the last picture shows values.
 pub(crate) fn show(app: &App, ui: &egui::Ui, rect: Rect) {
-    let shading = &app.look.settings.shading;
-    let Some([low, high]) = app.shot.as_ref().and_then(|shot| shot.counts.value_range) else { return };
+    let shading = &app.view.look.settings.shading;
+    let Some([low, high]) = app.view.shot.as_ref().and_then(|shot| shot.counts.value_range) else { return };
     let (true, Some(usual)) = (shading.legend, shading.color.usual_map()) else { return };
     let height = (0.5 * rect.height()).min(320.0);
     if height < 3.0 * MIN_LABEL_STEP {

@@ -28,6 +28,7 @@ mod rate;
 mod recording;
 mod render;
 mod screen;
+mod session;
 mod state;
 mod storage;
 #[cfg(test)]
@@ -35,6 +36,8 @@ mod tests;
 mod threads;
 mod tools;
 mod turns;
+mod ui;
+mod view;
 mod viewport;
 
 use std::path::PathBuf;
@@ -88,10 +91,10 @@ pub fn run(options: Options) -> Result<(), Error> {
         colors(&creation.egui_ctx);
         let (look, recent) = storage::load(creation.storage);
         let mut app = app::App::new(options, look, recent, &creation.egui_ctx);
-        app.format = creation.wgpu_render_state.as_ref().map(|state| state.target_format);
-        app.turns = turns::are_taken(creation).then(Default::default);
+        app.view.format = creation.wgpu_render_state.as_ref().map(|state| state.target_format);
+        app.view.turns = turns::are_taken(creation).then(Default::default);
         if let Some(state) = state {
-            let folder = app.state.as_deref().map(state::folder).unwrap_or_default();
+            let folder = app.session.file.as_deref().map(state::folder).unwrap_or_default();
             state.restore(&mut app, &folder);
         }
         Ok(Box::new(app))

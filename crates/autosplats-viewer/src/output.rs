@@ -24,7 +24,7 @@ pub(crate) fn photographed(app: &mut App, picture: Image, range: Option<[f64; 2]
         Goal::File(path) => save_picture(app, picture, path),
         Goal::Film(number) => {
             // A stopped film may have left a picture in work.
-            if let Some(recording) = app.recording.as_mut().filter(|recording| recording.number == number) {
+            if let Some(recording) = app.view.recording.as_mut().filter(|recording| recording.number == number) {
                 recording.arrived(picture, range);
             }
         }
@@ -33,7 +33,7 @@ pub(crate) fn photographed(app: &mut App, picture: Image, range: Option<[f64; 2]
 
 /// Writes a picture on a thread of its own and reports the result.
 pub(crate) fn save_picture(app: &mut App, picture: Image, path: PathBuf) {
-    let messages = app.messages.sender();
+    let messages = app.ui.messages.sender();
     spawn("picture", move || {
         let written = files::write(&path, |writer| files::encode_png(&picture, writer));
         messages.send(match written {
@@ -45,22 +45,22 @@ pub(crate) fn save_picture(app: &mut App, picture: Image, path: PathBuf) {
 
 /// Continues the film in progress.
 pub(crate) fn record(app: &mut App) {
-    let Some(recording) = &mut app.recording else { return };
+    let Some(recording) = &mut app.view.recording else { return };
     if let Some(result) = recording.ended() {
-        app.recording = None;
+        app.view.recording = None;
         match result {
-            Ok(note) => app.messages.note(note),
-            Err(error) => app.messages.error(error),
+            Ok(note) => app.ui.messages.note(note),
+            Err(error) => app.ui.messages.error(error),
         }
         return;
     }
     let number = recording.number;
     match recording.wanted() {
         Ok(None) => {}
-        Ok(Some(wish)) => app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::Film(number) }),
+        Ok(Some(wish)) => app.view.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::Film(number) }),
         Err(why) => {
             recording.stop();
-            app.messages.error(why);
+            app.ui.messages.error(why);
         }
     }
 }

@@ -14,7 +14,7 @@ const AXES: [(&str, Color32); 3] = [
 
 /// Draws the axes and the scale bar.
 pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect) {
-    if app.shot.is_none() {
+    if app.view.shot.is_none() {
         return;
     }
     let painter = ui.painter_at(rect);
@@ -24,7 +24,7 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect) {
 
 fn axes(app: &App, painter: &egui::Painter, rect: egui::Rect) {
     let middle = rect.right_bottom() + egui::vec2(-46.0, -46.0);
-    let mut axes: Vec<_> = app.navigation.world_axes_in_view().into_iter().zip(AXES).collect();
+    let mut axes: Vec<_> = app.view.navigation.world_axes_in_view().into_iter().zip(AXES).collect();
     // Axes that point away are drawn first.
     axes.sort_by(|(a, _), (b, _)| b.z.total_cmp(&a.z));
     for (axis, (name, color)) in axes {
@@ -38,7 +38,7 @@ fn axes(app: &App, painter: &egui::Painter, rect: egui::Rect) {
 }
 
 fn scale_bar(app: &App, painter: &egui::Painter, rect: egui::Rect) {
-    let per_point = app.navigation.height_at_pivot() / f64::from(rect.height().max(1.0));
+    let per_point = app.view.navigation.height_at_pivot() / f64::from(rect.height().max(1.0));
     let length = round(per_point * 130.0);
     if !(length > 0.0 && length.is_finite()) {
         return;

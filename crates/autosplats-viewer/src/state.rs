@@ -48,32 +48,32 @@ impl State {
     pub(crate) fn of(app: &App) -> Self {
         let layers = app.document().layers.iter().filter_map(|layer| {
             let appearance = Appearance { visible: layer.visible, tint: layer.tint };
-            let mut kept = StoredInput::of(app.inputs.get(&layer.id)?, appearance);
+            let mut kept = StoredInput::of(app.session.inputs.get(&layer.id)?, appearance);
             kept.pose = layer.pose;
             Some(kept)
         });
         // Inputs that failed, or are still being read, belong to the session too.
-        let started = |id| app.loading.contains_key(&id) || app.reloads.contains_key(&id);
-        let read = app.loader.jobs().iter().filter(|job| !started(job.id));
-        let read = read.map(|job| (&job.input, app.appearances.get(&job.id).copied().unwrap_or_default()));
-        let waiting = app.playing.waiting().map(|waiting| (waiting.input, waiting.appearance));
-        let failed = app.failed.iter().map(|(input, appearance)| (input, *appearance));
+        let started = |id| app.session.loading.contains_key(&id) || app.session.reloads.contains_key(&id);
+        let read = app.session.loader.jobs().iter().filter(|job| !started(job.id));
+        let read = read.map(|job| (&job.input, app.session.appearances.get(&job.id).copied().unwrap_or_default()));
+        let waiting = app.session.playing.waiting().map(|waiting| (waiting.input, waiting.appearance));
+        let failed = app.session.failed.iter().map(|(input, appearance)| (input, *appearance));
         let absent = read.chain(waiting).chain(failed).map(|(input, appearance)| StoredInput::of(input, appearance));
         // Points from a pipe cannot be read again.
         let again = |kept: &StoredInput| !matches!(Source::parse(&kept.source), Ok(Source::StandardInput));
         let inputs: Vec<StoredInput> = layers.chain(absent).filter(again).collect();
-        let up = app.up_axis.map(|axes| match axes {
+        let up = app.session.up_axis.map(|axes| match axes {
             Axes::ZUp => Up::Z,
             Axes::YUp => Up::Y,
             Axes::Camera => Up::Camera,
         });
         Self {
-            camera: (!inputs.is_empty()).then(|| app.navigation.goal_camera()),
-            clock: inputs.iter().any(StoredInput::moves).then(|| app.playing.clock.clone()),
+            camera: (!inputs.is_empty()).then(|| app.view.navigation.goal_camera()),
+            clock: inputs.iter().any(StoredInput::moves).then(|| app.session.playing.clock.clone()),
             inputs,
             up,
-            look: app.look.clone(),
-            keys: app.keys.clone(),
+            look: app.view.look.clone(),
+            keys: app.view.keys.clone(),
             clip: app.document().clip,
         }
     }
@@ -119,9 +119,9 @@ impl State {
     /// Opens what the session holds. Relative paths are resolved against `folder`.
     pub(crate) fn restore(self, app: &mut App, folder: &Path) {
         let Self { inputs, camera, up, look, keys, clip, clock } = self;
-        app.look = look;
-        app.keys = keys;
-        app.up_axis = up.map(|up| match up {
+        app.view.look = look;
+        app.view.keys = keys;
+        app.session.up_axis = up.map(|up| match up {
             Up::Z => Axes::ZUp,
             Up::Y => Axes::YUp,
             Up::Camera => Axes::Camera,
@@ -130,20 +130,20 @@ impl State {
             app.settle(|document| document.clip = clip);
         }
         if let Some(clock) = clock {
-            app.playing.clock = clock;
-            app.playing.clock.hold();
+            app.session.playing.clock = clock;
+            app.session.playing.clock.hold();
         }
         for kept in inputs {
             match kept.open(folder) {
                 Ok((input, appearance)) => {
                     // Inputs named on the command line may be in the session too.
                     let name = App::source_name(&input);
-                    let named = app.loader.jobs().iter().any(|job| App::source_name(&job.input) == name);
-                    if !named && !app.playing.has(&name) {
+                    let named = app.session.loader.jobs().iter().any(|job| App::source_name(&job.input) == name);
+                    if !named && !app.session.playing.has(&name) {
                         app.open_as(input, appearance);
                     }
                 }
-                Err(error) => app.messages.error(error.to_string()),
+                Err(error) => app.ui.messages.error(error.to_string()),
             }
         }
         if let Some(camera) = camera {
@@ -207,7 +207,7 @@ mod tests {
         let kept = without(kept);
         assert_eq!(without(State::of(&second)), kept, "what was still to be read is no less a part of it");
         let start = std::time::Instant::now();
-        while second.document().layers.is_empty() || !second.loader.jobs().is_empty() {
+        while second.document().layers.is_empty() || !second.session.loader.jobs().is_empty() {
             assert!(start.elapsed().as_secs() < 60, "it is read");
             second.follow_files();
             std::thread::sleep(std::time::Duration::from_millis(2));

@@ -11,12 +11,12 @@ const RECENT: &str = "recent";
 
 /// Stores the look and the recent inputs, with how these are read and played.
 pub(crate) fn save(app: &App, storage: &mut dyn eframe::Storage) {
-    let mut look = app.look.clone();
+    let mut look = app.view.look.clone();
     // Value range and exposure belong to one file's values and colours.
     look.settings.shading.range = None;
     look.settings.shading.exposure = None;
     eframe::set_value(storage, LOOK, &look);
-    eframe::set_value(storage, RECENT, &app.recent);
+    eframe::set_value(storage, RECENT, &app.session.recent);
 }
 
 /// Loads what was stored. Values that this version does not understand become defaults.

@@ -74,33 +74,33 @@ pub(crate) fn drag(app: &mut App, response: &egui::Response, size: [u32; 2]) {
     let Some(place) = response.interact_pointer_pos() else { return };
     let modifiers = response.ctx.input(|input| input.modifiers);
     if response.drag_started_by(egui::PointerButton::Primary) {
-        app.tools.given_up = false;
-        app.tools.way.clear();
+        app.ui.tools.given_up = false;
+        app.ui.tools.way.clear();
         // The pointer has already moved when a drag is recognized.
         let start = response.ctx.input(|input| input.pointer.press_origin());
-        app.tools.way.extend(start);
+        app.ui.tools.way.extend(start);
     }
-    let dab = app.tool == Tool::Brush && response.clicked_by(egui::PointerButton::Primary) && !modifiers.alt;
+    let dab = app.ui.tool == Tool::Brush && response.clicked_by(egui::PointerButton::Primary) && !modifiers.alt;
     if dab {
-        app.tools.given_up = false;
-        app.tools.way = vec![place];
+        app.ui.tools.given_up = false;
+        app.ui.tools.way = vec![place];
     }
-    if app.tools.given_up {
+    if app.ui.tools.given_up {
         return;
     }
-    if response.dragged_by(egui::PointerButton::Primary) && app.tools.way.last() != Some(&place) {
-        app.tools.way.push(place);
+    if response.dragged_by(egui::PointerButton::Primary) && app.ui.tools.way.last() != Some(&place) {
+        app.ui.tools.way.push(place);
     }
-    if !(dab || response.drag_stopped_by(egui::PointerButton::Primary)) || app.tools.way.is_empty() {
+    if !(dab || response.drag_stopped_by(egui::PointerButton::Primary)) || app.ui.tools.way.is_empty() {
         return;
     }
     let scale = size[0] as f32 / response.rect.width();
     let pixel = |place: &Pos2| [(place.x - response.rect.left()) * scale, (place.y - response.rect.top()) * scale];
-    let way: Vec<[f32; 2]> = std::mem::take(&mut app.tools.way).iter().map(pixel).collect();
-    let region = match app.tool {
+    let way: Vec<[f32; 2]> = std::mem::take(&mut app.ui.tools.way).iter().map(pixel).collect();
+    let region = match app.ui.tool {
         Tool::Rectangle => Region::rectangle(way[0], way[way.len() - 1]),
         Tool::Lasso => Region::lasso(&way),
-        _ => Region::brush(&way, app.tools.brush * scale),
+        _ => Region::brush(&way, app.ui.tools.brush * scale),
     };
     let mode = match (modifiers.shift, modifiers.command) {
         (true, true) => SelectMode::Intersect,
@@ -109,7 +109,7 @@ pub(crate) fn drag(app: &mut App, response: &egui::Response, size: [u32; 2]) {
         (false, false) => SelectMode::Replace,
     };
     let wish = Box::new(app.wish(size, false).of_points());
-    app.render.task(Task::Select { wish, region, through: app.tools.through, mode });
+    app.view.render.task(Task::Select { wish, region, through: app.ui.tools.through, mode });
 }
 
 impl App {
@@ -117,16 +117,16 @@ impl App {
     pub(crate) fn picked(&mut self, purpose: Purpose, point: Option<PickHit>) {
         let Some(seen) = point else {
             if purpose == Purpose::Inspect {
-                self.tools.inspected = None;
+                self.ui.tools.inspected = None;
             }
             return;
         };
         let described = self.document().describe(&seen.shown, seen.index);
         match (purpose, described) {
-            (Purpose::Inspect, described) => self.tools.inspected = described,
+            (Purpose::Inspect, described) => self.ui.tools.inspected = described,
             // The second click of a double click hits the same point.
-            (Purpose::Measure, Some(described)) if self.tools.measured.last() != Some(&described.position) => {
-                self.tools.measured.push(described.position);
+            (Purpose::Measure, Some(described)) if self.ui.tools.measured.last() != Some(&described.position) => {
+                self.ui.tools.measured.push(described.position);
             }
             _ => {}
         }
@@ -138,8 +138,8 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect, size: [u32; 2]) {
     let painter = ui.painter_at(rect);
     let accent = Color32::from_rgb(255, 160, 40);
     let line = Stroke::new(1.5, accent);
-    let way = &app.tools.way;
-    match app.tool {
+    let way = &app.ui.tools.way;
+    match app.ui.tool {
         Tool::Rectangle => {
             if let (Some(&from), Some(&to)) = (way.first(), way.last()) {
                 painter.rect(
@@ -156,27 +156,27 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect, size: [u32; 2]) {
         }
         Tool::Brush => {
             for &place in way {
-                painter.circle_filled(place, app.tools.brush, accent.gamma_multiply(0.08));
+                painter.circle_filled(place, app.ui.tools.brush, accent.gamma_multiply(0.08));
             }
             if let Some(place) = ui.ctx().pointer_hover_pos().filter(|place| rect.contains(*place)) {
-                painter.circle_stroke(place, app.tools.brush, line);
+                painter.circle_stroke(place, app.ui.tools.brush, line);
             }
         }
         _ => {}
     }
-    let Ok(lens) = app.navigation.camera().lens(size) else { return };
+    let Ok(lens) = app.view.navigation.camera().lens(size) else { return };
     let scale = rect.width() / size[0] as f32;
     let place = |world: DVec3| {
         let (pixel, _) = lens.to_pixel(world)?;
         Some(rect.min + egui::vec2(pixel.x as f32, pixel.y as f32) * scale)
     };
-    if let Some(point) = &app.tools.inspected
+    if let Some(point) = &app.ui.tools.inspected
         && let Some(at) = place(point.position)
     {
         painter.circle_stroke(at, 6.0, Stroke::new(2.0, Color32::BLACK));
         painter.circle_stroke(at, 6.0, line);
     }
-    let corners = &app.tools.measured;
+    let corners = &app.ui.tools.measured;
     let ruler = ruler(app);
     let text = |at: Pos2, text: String| {
         let galley = painter.layout_no_wrap(text, egui::FontId::proportional(13.0), Color32::WHITE);

@@ -24,21 +24,24 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
         let scale = ui.ctx().pixels_per_point();
         let side = |points: f32| ((points * scale).round() as u32).clamp(1, autosplats::MAX_SIDE);
         let size = [side(rect.width()), side(rect.height())];
-        app.view_rect = rect;
-        app.aspect = f64::from(size[0]) / f64::from(size[1]);
+        app.view.rect = rect;
+        app.view.aspect = f64::from(size[0]) / f64::from(size[1]);
         let busy = handle(app, &response, size);
         app.ask(ui.ctx(), size, busy);
         let painter = ui.painter_at(rect);
-        if let Some(picture) = &app.shot {
-            if let Some(format) = app.format {
+        if let Some(picture) = &app.view.shot {
+            if let Some(format) = app.view.format {
                 let on_screen = OnScreen { image: Arc::clone(&picture.image), sharp: picture.dots, format };
                 painter.add(eframe::egui_wgpu::Callback::new_paint_callback(rect, on_screen));
             }
         } else {
             painter.rect_filled(rect, 0.0, Color32::from_rgb(0x2b, 0x30, 0x37));
-            if app.document().layers.is_empty() && app.loader.jobs().is_empty() && app.playing.is_empty() {
+            if app.document().layers.is_empty()
+                && app.session.loader.jobs().is_empty()
+                && app.session.playing.is_empty()
+            {
                 welcome(app, ui, rect);
-            } else if let Some(waiting) = app.playing.waiting().next() {
+            } else if let Some(waiting) = app.session.playing.waiting().next() {
                 let text = format!("{}: {}", waiting.input.name, waiting.why);
                 let (font, color) = (egui::FontId::proportional(15.0), Color32::from_gray(190));
                 painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, color);
@@ -46,11 +49,11 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
         }
         tools::show(app, ui, rect, size);
         gizmo::show(app, ui, rect, size);
-        if app.look.overlay {
+        if app.view.look.overlay {
             overlay::show(app, ui, rect);
         }
         legend::show(app, ui, rect);
-        app.messages.show(ui.ctx(), rect);
+        app.ui.messages.show(ui.ctx(), rect);
     });
 }
 
@@ -66,11 +69,11 @@ fn welcome(app: &mut App, ui: &mut egui::Ui, rect: egui::Rect) {
             if ui.button("Open…").clicked() {
                 chosen = Some(None);
             }
-            if !app.recent.is_empty() {
+            if !app.session.recent.is_empty() {
                 ui.add_space(12.0);
                 ui.weak("Recently opened");
             }
-            for kept in app.recent.iter().take(8) {
+            for kept in app.session.recent.iter().take(8) {
                 if ui.link(kept.short_name()).on_hover_text(&kept.source).clicked() {
                     chosen = Some(Some(kept.clone()));
                 }
@@ -94,36 +97,36 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     let modifiers = context.input(|input| input.modifiers);
     // The way of the pointer before the drag was recognized belongs to the drag.
     let dragged = response.total_drag_delta().unwrap_or_default();
-    let drag = if response.dragged() { dragged - app.panels.dragged } else { egui::Vec2::ZERO };
-    app.panels.dragged = dragged;
+    let drag = if response.dragged() { dragged - app.ui.panels.dragged } else { egui::Vec2::ZERO };
+    app.ui.panels.dragged = dragged;
     let drag = DVec2::new(drag.x.into(), drag.y.into()) / f64::from(rect.height().max(1.0));
     let mut busy = false;
     if response.drag_started() {
         let pressed = context.input(|input| input.pointer.press_origin()).or(response.interact_pointer_pos());
-        app.panels.grabbed = pressed.and_then(|place| under(app, rect, place)).map(|(_, depth)| depth);
+        app.ui.panels.grabbed = pressed.and_then(|place| under(app, rect, place)).map(|(_, depth)| depth);
         // Takes the keyboard focus from any control, so that keys fly.
         response.request_focus();
         response.surrender_focus();
     }
     let left = response.dragged_by(PointerButton::Primary);
-    let turns = app.tool == Tool::Navigate || !app.tool.selects() || modifiers.alt;
+    let turns = app.ui.tool == Tool::Navigate || !app.ui.tool.selects() || modifiers.alt;
     if left && turns && !modifiers.shift && !modifiers.command {
-        app.navigation.orbit(drag);
+        app.view.navigation.orbit(drag);
         busy = true;
     } else if left && turns && modifiers.command {
-        app.navigation.look(drag);
+        app.view.navigation.look(drag);
         busy = true;
     } else if response.dragged_by(PointerButton::Secondary) || left && turns && modifiers.shift {
-        app.navigation.pan(drag, app.panels.grabbed);
+        app.view.navigation.pan(drag, app.ui.panels.grabbed);
         busy = true;
     } else if response.dragged_by(PointerButton::Middle) {
-        if app.tool.selects() {
-            app.navigation.orbit(drag);
+        if app.ui.tool.selects() {
+            app.view.navigation.orbit(drag);
         } else {
-            app.navigation.pan(drag, app.panels.grabbed);
+            app.view.navigation.pan(drag, app.ui.panels.grabbed);
         }
         busy = true;
-    } else if app.tool.selects() {
+    } else if app.ui.tool.selects() {
         tools::drag(app, response, size);
     }
     let pixel = |place: egui::Pos2| {
@@ -131,10 +134,10 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
         [(place.x - rect.left()) * scale, (place.y - rect.top()) * scale]
     };
     if let Some(place) = response.interact_pointer_pos() {
-        if response.double_clicked() && app.tool != Tool::Measure {
+        if response.double_clicked() && app.ui.tool != Tool::Measure {
             app.pick(size, pixel(place), Purpose::Pivot);
         } else if response.clicked() {
-            match app.tool {
+            match app.ui.tool {
                 Tool::Inspect => app.pick(size, pixel(place), Purpose::Inspect),
                 Tool::Measure => app.pick(size, pixel(place), Purpose::Measure),
                 _ => {}
@@ -143,27 +146,27 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     }
     if response.hovered() {
         let (scroll, pinch) = context.input(|input| (input.smooth_scroll_delta(), input.zoom_delta()));
-        app.panels.fingers = context.input(|input| by_fingers(&input.events)).unwrap_or(app.panels.fingers);
+        app.ui.panels.fingers = context.input(|input| by_fingers(&input.events)).unwrap_or(app.ui.panels.fingers);
         let way = DVec2::new(scroll.x.into(), scroll.y.into()) / f64::from(rect.height().max(1.0));
-        let fingers = app.panels.fingers && way != DVec2::ZERO;
+        let fingers = app.ui.panels.fingers && way != DVec2::ZERO;
         let mut factor = f64::from(pinch);
-        match app.look.two_fingers {
-            TwoFingers::Orbit if fingers => app.navigation.orbit(way),
+        match app.view.look.two_fingers {
+            TwoFingers::Orbit if fingers => app.view.navigation.orbit(way),
             TwoFingers::Pan if fingers => {
                 let depth = context.pointer_hover_pos().and_then(|place| under(app, rect, place));
-                app.navigation.pan(way, depth.map(|(_, depth)| depth));
+                app.view.navigation.pan(way, depth.map(|(_, depth)| depth));
             }
             _ => factor *= (f64::from(scroll.y) * ZOOM_PER_SCROLL).exp(),
         }
         if factor != 1.0 {
             let target = context.pointer_hover_pos().and_then(|place| zoom_target(app, context, rect, place));
-            app.navigation.zoom(factor, target);
+            app.view.navigation.zoom(factor, target);
         }
         busy |= factor != 1.0 || way != DVec2::ZERO;
     }
     if let Some(touch) = context.multi_touch().filter(|_| response.contains_pointer()) {
         let drag = touch.translation_delta / rect.height();
-        app.navigation.pan(DVec2::new(drag.x.into(), drag.y.into()), app.panels.grabbed);
+        app.view.navigation.pan(DVec2::new(drag.x.into(), drag.y.into()), app.ui.panels.grabbed);
         busy = true;
     }
     busy
@@ -187,11 +190,12 @@ fn zoom_target(app: &mut App, context: &egui::Context, rect: egui::Rect, place: 
     const MAX_TREMBLE_POINTS: f32 = 3.0;
     let time = context.input(|input| input.time);
     let last = app
+        .ui
         .panels
         .zoomed
         .filter(|last| time - last.time < MAX_WHEEL_PAUSE_S && last.place.distance(place) < MAX_TREMBLE_POINTS);
     let world = last.map(|last| last.world).or_else(|| under(app, rect, place).map(|(world, _)| world));
-    app.panels.zoomed = world.map(|world| Zoomed { time, place, world });
+    app.ui.panels.zoomed = world.map(|world| Zoomed { time, place, world });
     world
 }
 
@@ -211,13 +215,13 @@ fn by_fingers(events: &[egui::Event]) -> Option<bool> {
 fn under(app: &App, rect: egui::Rect, place: egui::Pos2) -> Option<(DVec3, f64)> {
     let share =
         DVec2::new(((place.x - rect.left()) / rect.width()).into(), ((place.y - rect.top()) / rect.height()).into());
-    let camera = app.navigation.camera();
-    let picture = app.shot.as_ref();
+    let camera = app.view.navigation.camera();
+    let picture = app.view.shot.as_ref();
     let surface = picture.and_then(|picture| picture.depths.world(&picture.camera, share));
     let [_, _, forward] = camera.axes().ok()?;
     let world = surface.or_else(|| {
         let depth = forward.dot(camera.look_at - camera.eye);
-        let size = [1000.0 * app.aspect, 1000.0].map(|side| side.round().max(1.0) as u32);
+        let size = [1000.0 * app.view.aspect, 1000.0].map(|side| side.round().max(1.0) as u32);
         camera.unproject(share * DVec2::new(size[0].into(), size[1].into()), depth, size).ok()
     })?;
     Some((world, forward.dot(world - camera.eye)))

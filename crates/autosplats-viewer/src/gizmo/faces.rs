@@ -75,14 +75,14 @@ impl Drag {
 pub(crate) fn preview(app: &mut App, clip: Option<ClipBox>) {
     let before = app.document().clip;
     if clip != before {
-        app.tools.gizmo.clip_before.get_or_insert(before);
+        app.ui.tools.gizmo.clip_before.get_or_insert(before);
         app.change(|document| document.clip = clip);
     }
 }
 
 /// Combines all changes to the clipping box since the last call into one undo step.
 pub(crate) fn settle(app: &mut App) {
-    let Some(before) = app.tools.gizmo.clip_before.take() else { return };
+    let Some(before) = app.ui.tools.gizmo.clip_before.take() else { return };
     let clip = app.document().clip;
     if clip == before {
         return;
@@ -98,10 +98,10 @@ pub(crate) fn switch(app: &mut App) {
         None => app.document().whole_bounds().map(|[min, max]| ClipBox::new(min, max)),
     };
     let Some(clip) = clip else {
-        app.messages.note("There are no points to clip");
+        app.ui.messages.note("There are no points to clip");
         return;
     };
-    app.panels.clip = clip.enabled;
+    app.ui.panels.clip = clip.enabled;
     preview(app, Some(clip));
     settle(app);
 }
@@ -167,7 +167,7 @@ fn faces_eye(clip: &ClipBox, view: &View, axis: usize, high: bool) -> bool {
 fn edge(app: &App, clip: &ClipBox, view: &View, painter: &Painter, ends: [DVec3; 2], (corner, along): (usize, usize)) {
     let sides = (0..3).filter(|&axis| axis != along).map(|axis| (axis, corner >> axis & 1 == 1));
     let behind_box = sides.into_iter().all(|(axis, high)| !faces_eye(clip, view, axis, high));
-    let picture = app.shot.as_ref();
+    let picture = app.view.shot.as_ref();
     let covered = |place: Pos2, depth: f64| {
         let surface = picture.and_then(|picture| picture.depths.world(&picture.camera, view.share(place)));
         surface.and_then(|surface| view.seen(surface)).is_some_and(|(_, before)| before < depth)

@@ -67,12 +67,12 @@ impl Gizmo {
 /// Handles the pointer. Returns whether a handle uses it.
 pub(crate) fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     let left = egui::PointerButton::Primary;
-    if app.tools.gizmo.drag.is_some() && !response.dragged_by(left) {
+    if app.ui.tools.gizmo.drag.is_some() && !response.dragged_by(left) {
         finish(app);
         return true;
     }
-    let Some(view) = View::new(&app.navigation.camera(), response.rect, size) else { return false };
-    if app.tools.gizmo.drag.is_some() {
+    let Some(view) = View::new(&app.view.navigation.camera(), response.rect, size) else { return false };
+    if app.ui.tools.gizmo.drag.is_some() {
         response.ctx.set_cursor_icon(CursorIcon::Grabbing);
         if let Some(place) = response.interact_pointer_pos() {
             follow(app, &view, place, response.ctx.input(|input| input.modifiers.command));
@@ -87,11 +87,11 @@ pub(crate) fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -
     let place = if begins { pressed.or(hover) } else { hover.filter(|_| response.hovered()) };
     let place = place.filter(|_| begins || !response.dragged());
     let handles = handles(app, &view);
-    app.tools.gizmo.hovered = place.filter(|_| !alt).and_then(|place| nearest(&handles, place));
-    let (Some(hovered), Some(place)) = (app.tools.gizmo.hovered, place) else { return false };
+    app.ui.tools.gizmo.hovered = place.filter(|_| !alt).and_then(|place| nearest(&handles, place));
+    let (Some(hovered), Some(place)) = (app.ui.tools.gizmo.hovered, place) else { return false };
     response.ctx.set_cursor_icon(CursorIcon::Grab);
     if begins {
-        app.tools.gizmo.drag = match hovered {
+        app.ui.tools.gizmo.drag = match hovered {
             Handle::Face { axis, high } => faces::Drag::begin(app, &view, axis, high, place).map(Drag::Face),
             _ => arrows::Drag::begin(app, &view, hovered, place).map(Drag::Points),
         };
@@ -101,12 +101,12 @@ pub(crate) fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -
 
 /// Cancels the drag. Returns whether there was one.
 pub(crate) fn cancel(app: &mut App) -> bool {
-    match app.tools.gizmo.drag.replace(Drag::Dropped) {
+    match app.ui.tools.gizmo.drag.replace(Drag::Dropped) {
         Some(Drag::Face(drag)) => drag.cancel(app),
         Some(Drag::Points(drag)) => drag.cancel(app),
         Some(Drag::Dropped) => {}
         None => {
-            app.tools.gizmo.drag = None;
+            app.ui.tools.gizmo.drag = None;
             return false;
         }
     }
@@ -114,7 +114,7 @@ pub(crate) fn cancel(app: &mut App) -> bool {
 }
 
 fn finish(app: &mut App) {
-    match app.tools.gizmo.drag.take() {
+    match app.ui.tools.gizmo.drag.take() {
         Some(Drag::Face(_)) => settle(app),
         Some(Drag::Points(drag)) => drag.finish(app),
         Some(Drag::Dropped) | None => {}
@@ -123,39 +123,39 @@ fn finish(app: &mut App) {
 
 /// Moves the dragged handle to follow the pointer; in steps if `stepped`.
 fn follow(app: &mut App, view: &View, place: Pos2, stepped: bool) {
-    match app.tools.gizmo.drag.take() {
+    match app.ui.tools.gizmo.drag.take() {
         Some(Drag::Face(drag)) => {
             drag.follow(app, view, place);
-            app.tools.gizmo.drag = Some(Drag::Face(drag));
+            app.ui.tools.gizmo.drag = Some(Drag::Face(drag));
         }
         Some(Drag::Points(mut drag)) => {
             drag.follow(app, view, place, stepped);
-            app.tools.gizmo.drag = Some(Drag::Points(drag));
+            app.ui.tools.gizmo.drag = Some(Drag::Points(drag));
         }
-        dropped => app.tools.gizmo.drag = dropped,
+        dropped => app.ui.tools.gizmo.drag = dropped,
     }
 }
 
 /// Computes the middle of the selection, if it may have changed.
 fn find_middle(app: &mut App) {
     let version = app.version();
-    if app.tool == Tool::Move && app.tools.gizmo.middle.0 != version {
+    if app.ui.tool == Tool::Move && app.ui.tools.gizmo.middle.0 != version {
         let bounds = app.document().selected_bounds();
-        app.tools.gizmo.middle = (version, bounds.map(|[low, high]| low.midpoint(high)));
+        app.ui.tools.gizmo.middle = (version, bounds.map(|[low, high]| low.midpoint(high)));
     }
 }
 
 /// Middle of the arrows and rings, if they are shown.
 fn middle(app: &App) -> Option<DVec3> {
-    match &app.tools.gizmo.drag {
+    match &app.ui.tools.gizmo.drag {
         Some(Drag::Points(drag)) => Some(drag.middle()),
-        _ => app.tools.gizmo.middle.1.filter(|_| app.tool == Tool::Move),
+        _ => app.ui.tools.gizmo.middle.1.filter(|_| app.ui.tool == Tool::Move),
     }
 }
 
 /// The clipping box, if its handles are shown.
 fn clip(app: &App) -> Option<ClipBox> {
-    app.document().clip.filter(|clip| clip.enabled && app.panels.clip)
+    app.document().clip.filter(|clip| clip.enabled && app.ui.panels.clip)
 }
 
 fn handles(app: &App, view: &View) -> Vec<(Handle, Shape)> {
@@ -171,9 +171,9 @@ fn handles(app: &App, view: &View) -> Vec<(Handle, Shape)> {
 
 /// Draws the handles over the picture.
 pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect, size: [u32; 2]) {
-    let Some(view) = View::new(&app.navigation.camera(), rect, size) else { return };
+    let Some(view) = View::new(&app.view.navigation.camera(), rect, size) else { return };
     let painter = ui.painter_at(rect);
-    let gizmo = &app.tools.gizmo;
+    let gizmo = &app.ui.tools.gizmo;
     let (taken, says) = match &gizmo.drag {
         Some(Drag::Face(drag)) => (Some(drag.handle()), drag.text(app)),
         Some(Drag::Points(drag)) => (Some(drag.handle), Some(drag.text(app))),

@@ -25,10 +25,10 @@ fn app() -> (App, View) {
     });
     app.look_from(autosplats::ViewDirection::Iso, true);
     switch(&mut app);
-    app.tool = Tool::Move;
+    app.ui.tool = Tool::Move;
     find_middle(&mut app);
     let rect = Rect::from_min_size(pos2(0.0, 0.0), vec2(600.0, 400.0));
-    let view = View::new(&app.navigation.camera(), rect, [600, 400]).expect("a camera that sees");
+    let view = View::new(&app.view.navigation.camera(), rect, [600, 400]).expect("a camera that sees");
     (app, view)
 }
 
@@ -44,11 +44,11 @@ fn begin(app: &mut App, view: &View, handle: Handle) -> Pos2 {
         _ => view.place(middle),
     };
     let place = place.expect("before the eye");
-    app.tools.gizmo.drag = match handle {
+    app.ui.tools.gizmo.drag = match handle {
         Handle::Face { axis, high } => faces::Drag::begin(app, view, axis, high, place).map(Drag::Face),
         handle => arrows::Drag::begin(app, view, handle, place).map(Drag::Points),
     };
-    assert!(app.tools.gizmo.is_dragging(), "{handle:?} is taken");
+    assert!(app.ui.tools.gizmo.is_dragging(), "{handle:?} is taken");
     place
 }
 
@@ -61,7 +61,7 @@ fn a_drag_is_one_step() {
             follow(&mut app, &view, place + vec2(-4.0, -4.0) * step as f32, false);
         }
         finish(&mut app);
-        assert!(!app.tools.gizmo.is_busy(), "{handle:?} is let go");
+        assert!(!app.ui.tools.gizmo.is_busy(), "{handle:?} is let go");
         let wanted = if matches!(handle, Handle::Face { .. }) { "Clipping box" } else { "Move 1,000 points" };
         assert_eq!(steps(&mut app), [wanted, "Clipping box"], "{handle:?}, after the box was put up");
     }

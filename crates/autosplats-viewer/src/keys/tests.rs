@@ -65,27 +65,27 @@ fn keys_do_nothing_behind_a_question() {
     for key in [Key::Delete, Key::Tab] {
         press(&mut app, &context, key, true);
     }
-    assert_eq!(app.history.undo_label(), None, "nothing was deleted");
-    assert!(!app.look.dots, "nor shown in another way");
+    assert_eq!(app.session.history.undo_label(), None, "nothing was deleted");
+    assert!(!app.view.look.dots, "nor shown in another way");
     press(&mut app, &context, Key::F20, false);
     for key in [Key::Delete, Key::Tab] {
         press(&mut app, &context, key, false);
     }
-    assert!(app.history.undo_label().is_some(), "without a question they do what they do");
-    assert!(app.look.dots, "both of them");
+    assert!(app.session.history.undo_label().is_some(), "without a question they do what they do");
+    assert!(app.view.look.dots, "both of them");
 }
 
 #[test]
 fn escape_gives_up_a_drag_before_it_closes_a_window() {
     let context = egui::Context::default();
     let mut app = app(&context);
-    app.panels.help = true;
-    app.tool = Tool::Lasso;
-    app.tools.draw(&[egui::pos2(1.0, 2.0)]);
+    app.ui.panels.help = true;
+    app.ui.tool = Tool::Lasso;
+    app.ui.tools.draw(&[egui::pos2(1.0, 2.0)]);
     press(&mut app, &context, Key::Escape, false);
-    assert!(app.panels.help && app.tool == Tool::Lasso, "first the drag");
+    assert!(app.ui.panels.help && app.ui.tool == Tool::Lasso, "first the drag");
     press(&mut app, &context, Key::Escape, false);
-    assert!(!app.panels.help, "then the window");
+    assert!(!app.ui.panels.help, "then the window");
 }
 
 #[test]

@@ -11,13 +11,13 @@ use crate::gizmo;
 const DRAG_SPEED_SHARE: f64 = 0.002;
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
-    if !app.panels.clip {
+    if !app.ui.panels.clip {
         return;
     }
     let mut open = true;
     let mut clip = app.document().clip;
     let mut busy = false;
-    let place = app.view_rect.right_top() + egui::vec2(-16.0, 60.0);
+    let place = app.view.rect.right_top() + egui::vec2(-16.0, 60.0);
     let window = egui::Window::new("Clipping box")
         .open(&mut open)
         .resizable(false)
@@ -30,10 +30,10 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         }
         buttons(app, ui, &mut clip);
     });
-    app.panels.clip = open;
+    app.ui.panels.clip = open;
     gizmo::preview(app, clip);
     // Changes by dragging or typing a number become one undo step when the number is released.
-    if !busy && app.tools.gizmo.is_busy() && !app.tools.gizmo.is_dragging() {
+    if !busy && app.ui.tools.gizmo.is_busy() && !app.ui.tools.gizmo.is_dragging() {
         gizmo::settle(app);
         // Points are counted again only after the change; the repaint shows the counts.
         context.request_repaint();

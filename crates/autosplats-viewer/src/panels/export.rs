@@ -39,8 +39,8 @@ impl Export {
 }
 
 pub(crate) fn open(app: &mut App) {
-    app.panels.export.target.open();
-    app.panels.export.open = true;
+    app.ui.panels.export.target.open();
+    app.ui.panels.export.open = true;
 }
 
 /// An export in progress.
@@ -78,20 +78,20 @@ impl Progress for Listener {
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
     finish(app);
-    if !app.panels.export.open {
+    if !app.ui.panels.export.open {
         return;
     }
     let mut open = true;
     let mut write = None;
     let choices = choices(app);
-    if !choices.iter().any(|(_, what, _)| *what == app.panels.export.what) {
-        app.panels.export.what = ExportScope::Shown;
-        app.panels.export.target.forget();
+    if !choices.iter().any(|(_, what, _)| *what == app.ui.panels.export.what) {
+        app.ui.panels.export.what = ExportScope::Shown;
+        app.ui.panels.export.target.forget();
     }
     let window = egui::Window::new("Export points").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(app.view_rect.center() - egui::vec2(220.0, 140.0)).show(context, |ui| {
+    window.default_pos(app.view.rect.center() - egui::vec2(220.0, 140.0)).show(context, |ui| {
         ui.set_width(420.0);
-        let export = &mut app.panels.export;
+        let export = &mut app.ui.panels.export;
         if let Some(work) = &export.work {
             let done = work.listener.done.load(Ordering::Relaxed) as f32 / 1000.0;
             ui.add(egui::ProgressBar::new(done).text(work.path.display().to_string()));
@@ -109,12 +109,12 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         let formats: Vec<_> = written_formats().flat_map(|(_, extensions)| extensions.iter().copied()).collect();
         ui.small(format!("The extension of the name sets the format: .{}", formats.join(" .")));
         let words = DialogTexts { title: "Export points", name: "points.ply", verb: "Export" };
-        write = export.target.show(ui, &words, &mut app.panels.entered, None);
+        write = export.target.show(ui, &words, &mut app.ui.panels.entered, None);
     });
-    app.panels.export.open = open;
+    app.ui.panels.export.open = open;
     if let Some(Write { path, replace, answered }) = write {
         let replace = match (answered, replace) {
-            (true, _) => app.panels.export.replace,
+            (true, _) => app.ui.panels.export.replace,
             (false, true) => Replace::Files,
             (false, false) => Replace::Nothing,
         };
@@ -148,31 +148,31 @@ fn start(app: &mut App, context: &egui::Context, path: PathBuf, replace: Replace
         context: context.clone(),
     });
     let (sender, result) = channel();
-    let what = app.panels.export.what;
+    let what = app.ui.panels.export.what;
     let (theirs, points, target) = (Arc::clone(&listener), document.clone(), path.clone());
     spawn("export", move || {
         let _ = sender.send(export(&points, what, &target, replace, &*theirs));
         theirs.context.request_repaint();
     });
-    app.panels.export.target.forget();
-    app.panels.export.work = Some(ExportJob { document, what, path, listener, result });
+    app.ui.panels.export.target.forget();
+    app.ui.panels.export.work = Some(ExportJob { document, what, path, listener, result });
 }
 
 /// Receives the result of the export.
 fn finish(app: &mut App) {
-    let Some(result) = app.panels.export.work.as_ref().and_then(|work| work.result.try_recv().ok()) else { return };
-    let Some(ExportJob { document, what, path, listener, .. }) = app.panels.export.work.take() else { return };
+    let Some(result) = app.ui.panels.export.work.as_ref().and_then(|work| work.result.try_recv().ok()) else { return };
+    let Some(ExportJob { document, what, path, listener, .. }) = app.ui.panels.export.work.take() else { return };
     let notes = std::mem::take(&mut *listener.notes.lock().unwrap_or_else(PoisonError::into_inner));
-    notes.into_iter().for_each(|note| app.messages.note(note));
+    notes.into_iter().for_each(|note| app.ui.messages.note(note));
     match result {
         Ok(Exported { points }) => {
-            saved_layers(&document, what).into_iter().for_each(|id| app.history.mark_saved(&document, id));
-            app.messages.note(format!("{} points were written to {}", grouped(points), path.display()));
-            app.panels.export.open = false;
+            saved_layers(&document, what).into_iter().for_each(|id| app.session.history.mark_saved(&document, id));
+            app.ui.messages.note(format!("{} points were written to {}", grouped(points), path.display()));
+            app.ui.panels.export.open = false;
         }
-        Err(ExportError::Cancelled) => app.messages.note("Nothing was written"),
+        Err(ExportError::Cancelled) => app.ui.messages.note("Nothing was written"),
         Err(error) => {
-            let export = &mut app.panels.export;
+            let export = &mut app.ui.panels.export;
             export.replace = match &error {
                 ExportError::Exists { .. } => Replace::Files,
                 ExportError::Input { .. } => Replace::Inputs,

@@ -119,23 +119,23 @@ impl Default for Film {
 }
 
 pub(crate) fn toggle(app: &mut App) {
-    app.panels.film.target.forget();
-    app.panels.film.open = !app.panels.film.open;
+    app.ui.panels.film.target.forget();
+    app.ui.panels.film.open = !app.ui.panels.film.open;
 }
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
     play(app, context);
-    if !app.panels.film.open {
+    if !app.ui.panels.film.open {
         return;
     }
     let mut open = true;
     let window = egui::Window::new("Film").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(app.view_rect.right_top() + egui::vec2(-410.0, 10.0)).show(context, |ui| {
+    window.default_pos(app.view.rect.right_top() + egui::vec2(-410.0, 10.0)).show(context, |ui| {
         ui.set_width(380.0);
-        if let Some(recording) = &app.recording {
+        if let Some(recording) = &app.view.recording {
             ui.add(egui::ProgressBar::new(recording.fraction()).show_percentage());
             if ui.button("Stop").clicked() {
-                output::stop(&mut app.recording);
+                output::stop(&mut app.view.recording);
             }
             return;
         }
@@ -144,8 +144,8 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         ui.separator();
         let ready = has_cameras(app);
         ui.horizontal(|ui| {
-            let given = clock(app).map(|clock| app.panels.film.seconds(Some(clock)));
-            let film = &mut app.panels.film;
+            let given = clock(app).map(|clock| app.ui.panels.film.seconds(Some(clock)));
+            let film = &mut app.ui.panels.film;
             match given.filter(|_| film.time == Time::Once) {
                 Some(mut seconds) => {
                     let number = egui::DragValue::new(&mut seconds).max_decimals(1).suffix(" s");
@@ -160,42 +160,42 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             let button = ui.add_enabled(ready, egui::Button::new(if playing { "Stop" } else { "Play" }));
             if button.clicked() {
                 let began = context.input(|input| input.time);
-                app.panels.film.played = (!playing).then(|| (moments(app), began));
+                app.ui.panels.film.played = (!playing).then(|| (moments(app), began));
             }
         });
         ui.separator();
         target(app, ui, ready);
     });
-    app.panels.film.open = open;
+    app.ui.panels.film.open = open;
 }
 
 /// The choice of the camera path.
 fn way(app: &mut App, ui: &mut egui::Ui) {
     ui.horizontal(|ui| {
-        ui.radio_value(&mut app.panels.film.keyed, false, "Turntable");
-        ui.radio_value(&mut app.panels.film.keyed, true, "Through keys");
+        ui.radio_value(&mut app.ui.panels.film.keyed, false, "Turntable");
+        ui.radio_value(&mut app.ui.panels.film.keyed, true, "Through keys");
     });
-    if !app.panels.film.keyed {
-        ui.add(egui::Slider::new(&mut app.panels.film.degrees, -720.0..=720.0).suffix("°").text("turn"));
+    if !app.ui.panels.film.keyed {
+        ui.add(egui::Slider::new(&mut app.ui.panels.film.degrees, -720.0..=720.0).suffix("°").text("turn"));
         return;
     }
-    let here = app.navigation.goal_camera();
+    let here = app.view.navigation.goal_camera();
     let mut change = None;
     ui.horizontal(|ui| {
         if ui.button("Add this view").clicked() {
-            change = Some((app.keys.len(), Some(here)));
+            change = Some((app.view.keys.len(), Some(here)));
         }
-        ui.weak(format!("{} keys", app.keys.len()));
+        ui.weak(format!("{} keys", app.view.keys.len()));
     });
     egui::ScrollArea::vertical().max_height(140.0).show(ui, |ui| {
-        for number in 0..app.keys.len() {
+        for number in 0..app.view.keys.len() {
             ui.horizontal(|ui| {
                 if ui.link(format!("Key {}", number + 1)).on_hover_text("Go there").clicked() {
-                    let camera = app.keys[number];
-                    app.navigation.go_to(&camera, false);
+                    let camera = app.view.keys[number];
+                    app.view.navigation.go_to(&camera, false);
                 }
                 if ui.small_button("Replace").on_hover_text("By the present view").clicked() {
-                    app.keys[number] = here;
+                    app.view.keys[number] = here;
                 }
                 if ui.small_button("×").on_hover_text("Remove this key").clicked() {
                     change = Some((number, None));
@@ -204,9 +204,9 @@ fn way(app: &mut App, ui: &mut egui::Ui) {
         }
     });
     match change {
-        Some((_, Some(camera))) => app.keys.push(camera),
+        Some((_, Some(camera))) => app.view.keys.push(camera),
         Some((number, None)) => {
-            app.keys.remove(number);
+            app.view.keys.remove(number);
         }
         None => {}
     }
@@ -214,69 +214,74 @@ fn way(app: &mut App, ui: &mut egui::Ui) {
 
 /// The choice of how time runs, if an input has a timeline.
 fn time(app: &mut App, ui: &mut egui::Ui) {
-    if !app.playing.has_timeline() {
+    if !app.session.playing.has_timeline() {
         return;
     }
     ui.separator();
-    let [begin, end] = app.playing.clock.span();
-    let (speed, looped) = (app.playing.clock.speed, app.playing.clock.looped);
+    let [begin, end] = app.session.playing.clock.span();
+    let (speed, looped) = (app.session.playing.clock.speed, app.session.playing.clock.looped);
     ui.horizontal(|ui| {
         ui.label("Time");
-        let time = &mut app.panels.film.time;
+        let time = &mut app.ui.panels.film.time;
         ui.radio_value(time, Time::Runs, "runs").on_hover_text("Playback continues for the length of the film");
         ui.radio_value(time, Time::Once, "runs once").on_hover_text("The film is as long as the played span");
         ui.radio_value(time, Time::Stands, "stands still").on_hover_text("All pictures show the present frame");
     });
-    let film = &app.panels.film;
+    let film = &app.ui.panels.film;
     let around = if looped { ", repeatedly" } else { ", then standing still" };
     let around = if film.time == Time::Runs && film.seconds * speed > end - begin { around } else { "" };
     let words = match film.time {
-        Time::Stands => format!("{:.2} s in all pictures", app.playing.clock.position()),
+        Time::Stands => format!("{:.2} s in all pictures", app.session.playing.clock.position()),
         _ => format!("{begin:.2} to {end:.2} s at {speed:.2}×{around}"),
     };
     ui.weak(words).on_hover_text("Begin, end, speed and loop are those of the timeline");
-    if app.playing.is_live() {
+    if app.session.playing.is_live() {
         ui.weak("Live inputs stand still.");
     }
 }
 
 /// The clock, if time runs in the film.
 fn clock(app: &App) -> Option<&Clock> {
-    let runs = app.panels.film.time != Time::Stands && app.playing.has_timeline();
-    runs.then_some(&app.playing.clock)
+    let runs = app.ui.panels.film.time != Time::Stands && app.session.playing.has_timeline();
+    runs.then_some(&app.session.playing.clock)
 }
 
 /// Whether the film has cameras.
 fn has_cameras(app: &App) -> bool {
-    !app.document().layers.is_empty() && (!app.panels.film.keyed || !app.keys.is_empty())
+    !app.document().layers.is_empty() && (!app.ui.panels.film.keyed || !app.view.keys.is_empty())
 }
 
 /// Why the film cannot be made, if time is to run; `None` if it can.
 fn problem(app: &App) -> Option<String> {
     let clock = clock(app)?;
-    let pictures = app.panels.film.seconds(Some(clock)) * f64::from(app.panels.film.rate);
+    let pictures = app.ui.panels.film.seconds(Some(clock)) * f64::from(app.ui.panels.film.rate);
     if pictures > MAX_PICTURES {
         return Some(format!(
             "The film has {pictures:.0} pictures, more than {MAX_PICTURES:.0}; play a part, or faster"
         ));
     }
-    if let Some(waiting) = app.playing.waiting().next() {
+    if let Some(waiting) = app.session.playing.waiting().next() {
         return Some(format!("{} has no points yet: {}", waiting.input.name, waiting.why));
     }
-    let unsaved = app.history.unsaved().find(|&id| app.playing.shows(id)).and_then(|id| app.document().layer(id))?;
+    let unsaved = app
+        .session
+        .history
+        .unsaved()
+        .find(|&id| app.session.playing.shows(id))
+        .and_then(|id| app.document().layer(id))?;
     Some(format!("{} has unsaved edits of one frame; export or undo them, or let time stand still", unsaved.name))
 }
 
 /// The cameras of the film and their times, a million at most.
 fn moments(app: &App) -> Vec<FilmPicture> {
-    let (film, clock) = (&app.panels.film, clock(app));
+    let (film, clock) = (&app.ui.panels.film, clock(app));
     let pictures = film.pictures(clock);
     let cameras = if app.document().layers.is_empty() {
         Vec::new()
     } else if film.keyed {
-        path(&app.keys, pictures)
+        path(&app.view.keys, pictures)
     } else {
-        turntable(&app.navigation.goal_camera(), app.up(), film.degrees, pictures)
+        turntable(&app.view.navigation.goal_camera(), app.up(), film.degrees, pictures)
     };
     let place = |picture: usize| clock.map(|clock| clock.place_after(picture as f64 / f64::from(film.rate)));
     cameras.into_iter().enumerate().map(|(picture, camera)| FilmPicture { camera, place: place(picture) }).collect()
@@ -285,16 +290,16 @@ fn moments(app: &App) -> Vec<FilmPicture> {
 /// The output file. `ready` says whether the film has cameras.
 fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
     let context = ui.ctx().clone();
-    let film = &mut app.panels.film;
+    let film = &mut app.ui.panels.film;
     ui.horizontal(|ui| {
         ui.add(egui::DragValue::new(&mut film.size[0]).range(16..=MAX_SIDE).suffix(" px"));
         ui.label("×");
         ui.add(egui::DragValue::new(&mut film.size[1]).range(16..=MAX_SIDE).suffix(" px"));
     });
     let ffmpeg = film.has_ffmpeg(&context);
-    let pictures = app.panels.film.pictures(clock(app));
+    let pictures = app.ui.panels.film.pictures(clock(app));
     let unready = problem(app);
-    let film = &mut app.panels.film;
+    let film = &mut app.ui.panels.film;
     if film.refused.take_if(|refused| *refused != pictures).is_some() {
         film.target.forget();
     }
@@ -308,7 +313,7 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
         Ok(_) => unready,
     };
     let words = DialogTexts { title: "Save film", name: "film.mp4", verb: "Write" };
-    let Some(write) = film.target.show(ui, &words, &mut app.panels.entered, problem) else { return };
+    let Some(write) = film.target.show(ui, &words, &mut app.ui.panels.entered, problem) else { return };
     let Ok(target) = Target::new(&write.path) else { return };
     // The system's dialog has asked about one name only, but a film of pictures has many.
     let there = target.existing(pictures).filter(|there| !(write.answered || write.replace && *there == write.path));
@@ -324,25 +329,26 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
     let cameras = moments.iter().map(|moment| moment.camera).collect();
     let places: Vec<f64> = moments.iter().filter_map(|moment| moment.place).collect();
     let runs = !places.is_empty();
-    let reel = runs.then(|| Reel::start(app.playing.tracks(&places), app.messages.sender(), context.clone()));
+    let reel =
+        runs.then(|| Reel::start(app.session.playing.tracks(&places), app.ui.messages.sender(), context.clone()));
     let wish = app.wish(size, false);
-    app.recording = Some(Recording::start(wish, cameras, reel, rate, target, &context));
+    app.view.recording = Some(Recording::start(wish, cameras, reel, rate, target, &context));
 }
 
 /// Continues the preview.
 fn play(app: &mut App, context: &egui::Context) {
-    let Some((moments, began)) = &app.panels.film.played else { return };
-    let picture = (context.input(|input| input.time) - began) * f64::from(app.panels.film.rate);
+    let Some((moments, began)) = &app.ui.panels.film.played else { return };
+    let picture = (context.input(|input| input.time) - began) * f64::from(app.ui.panels.film.rate);
     match moments.get(picture as usize) {
         Some(&FilmPicture { camera, place }) => {
-            app.navigation.go_to(&camera, true);
+            app.view.navigation.go_to(&camera, true);
             if let Some(place) = place {
-                app.playing.clock.playing = false;
-                app.playing.clock.seek(place);
+                app.session.playing.clock.playing = false;
+                app.session.playing.clock.seek(place);
             }
             app.note_movement();
             context.request_repaint();
         }
-        None => app.panels.film.played = None,
+        None => app.ui.panels.film.played = None,
     }
 }

@@ -63,8 +63,8 @@ pub(crate) fn focus_next_part(app: &mut App, context: &Context, back: bool) {
     let mut windows: Vec<LayerId> = controls.iter().map(|(_, layer, _)| *layer).collect();
     windows.retain(|layer| layer.order == egui::Order::Middle);
     windows.dedup();
-    let picture = app.view_rect;
-    let panels = app.panels.focus.panels.iter().filter(|panel| !picture.contains(panel.center()));
+    let picture = app.view.rect;
+    let panels = app.ui.panels.focus.panels.iter().filter(|panel| !picture.contains(panel.center()));
     let mut parts: Vec<WindowPart> = panels.map(|panel| WindowPart::Panel(*panel)).collect();
     parts.extend(windows.into_iter().map(WindowPart::Window));
     let first =
@@ -84,15 +84,15 @@ pub(crate) fn focus_next_part(app: &mut App, context: &Context, back: bool) {
         (None, Some(focused)) => memory.surrender_focus(focused),
         (None, None) => {}
     });
-    app.panels.focus.by_keys = true;
+    app.ui.panels.focus.by_keys = true;
 }
 
 /// Draws a ring around the focused control, if keys have set the focus.
 pub(super) fn ring(app: &mut App, context: &Context) {
     if context.input(|input| input.pointer.any_pressed()) {
-        app.panels.focus.by_keys = false;
+        app.ui.panels.focus.by_keys = false;
     }
-    if !app.panels.focus.by_keys {
+    if !app.ui.panels.focus.by_keys {
         return;
     }
     let focused = context.memory(|memory| memory.focused());

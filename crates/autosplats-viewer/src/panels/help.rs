@@ -22,7 +22,7 @@ const MOUSE: [(&str, &str); 13] = [
 ];
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
-    let mut open = app.panels.help;
+    let mut open = app.ui.panels.help;
     let window = egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).resizable(false);
     window.anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(context, |ui| {
         ui.set_width(440.0);
@@ -42,5 +42,5 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             });
         });
     });
-    app.panels.help = open;
+    app.ui.panels.help = open;
 }

@@ -16,7 +16,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.small_button("+").on_hover_text("Open more").clicked() {
                     let context = ui.ctx().clone();
-                    app.panels.dialogs.open(&context);
+                    app.ui.panels.dialogs.open(&context);
                 }
             });
         });
@@ -28,17 +28,20 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             for id in ids {
                 layer(app, ui, id);
             }
-            if app.document().layers.is_empty() && app.loader.jobs().is_empty() && app.playing.is_empty() {
+            if app.document().layers.is_empty()
+                && app.session.loader.jobs().is_empty()
+                && app.session.playing.is_empty()
+            {
                 ui.weak("Nothing is open.");
             }
         });
     });
-    app.panels.focus.part(shown.response.rect);
+    app.ui.panels.focus.part(shown.response.rect);
 }
 
 /// The inputs that are being read.
 fn loading(app: &App, ui: &mut egui::Ui) {
-    for job in app.loader.jobs() {
+    for job in app.session.loader.jobs() {
         ui.horizontal(|ui| {
             if ui.small_button("×").on_hover_text("Stop reading").clicked() {
                 job.cancel();
@@ -52,7 +55,7 @@ fn loading(app: &App, ui: &mut egui::Ui) {
 /// The playing inputs that have no points yet, and why.
 fn waiting(app: &mut App, ui: &mut egui::Ui) {
     let mut given_up = None;
-    for WaitingInput { number, input, why, read, .. } in app.playing.waiting() {
+    for WaitingInput { number, input, why, read, .. } in app.session.playing.waiting() {
         ui.horizontal(|ui| {
             if ui.small_button("×").on_hover_text("Do not open it").clicked() {
                 given_up = Some(number);
@@ -67,7 +70,7 @@ fn waiting(app: &mut App, ui: &mut egui::Ui) {
         ui.add_space(4.0);
     }
     if let Some(number) = given_up {
-        app.playing.give_up(number);
+        app.session.playing.give_up(number);
     }
 }
 
@@ -75,7 +78,7 @@ fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
     let Some(layer) = app.document().layer(id) else { return };
     let (name, visible, tint, path) = (layer.name.clone(), layer.visible, layer.tint, layer.path.clone());
     let counts = app.counts().layers.get(&id).copied().unwrap_or_default();
-    let unsaved = app.history.is_unsaved(id);
+    let unsaved = app.session.history.is_unsaved(id);
     ui.push_id(id, |ui| {
         ui.horizontal(|ui| {
             let mut shown = visible;
@@ -97,7 +100,8 @@ fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
             let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
             let file = path.map_or_else(String::new, |path| format!("\n{}", path.display()));
             let edits = if unsaved { "\nIts edits are not saved" } else { "" };
-            let begins = app.playing.alignment(id).map_or_else(String::new, |words| format!("\nIt begins {words}"));
+            let begins =
+                app.session.playing.alignment(id).map_or_else(String::new, |words| format!("\nIt begins {words}"));
             if label.double_clicked() {
                 super::layer::rename(app, id);
             }
@@ -153,16 +157,16 @@ fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
 
 /// Removes all inputs.
 pub(crate) fn close_all(app: &mut App) {
-    app.loader.cancel_all();
-    app.playing.give_up_waiting();
+    app.session.loader.cancel_all();
+    app.session.playing.give_up_waiting();
     let ids = app.document().layers.iter().map(|layer| layer.id).collect();
     remove(app, ids);
 }
 
 /// Removes layers as an undo step. Asks first if edits would be lost.
 fn remove(app: &mut App, ids: Vec<LayerId>) {
-    if ids.iter().any(|&id| app.history.is_unsaved(id)) {
-        app.panels.removal = ids;
+    if ids.iter().any(|&id| app.session.history.is_unsaved(id)) {
+        app.ui.panels.removal = ids;
     } else {
         remove_now(app, &ids);
     }
@@ -185,10 +189,11 @@ fn remove_now(app: &mut App, ids: &[LayerId]) {
 
 /// Asks before layers with unsaved edits are removed.
 pub(super) fn removal(app: &mut App, context: &egui::Context) {
-    if app.panels.removal.is_empty() {
+    if app.ui.panels.removal.is_empty() {
         return;
     }
-    let unsaved: Vec<LayerId> = app.panels.removal.iter().copied().filter(|&id| app.history.is_unsaved(id)).collect();
+    let unsaved: Vec<LayerId> =
+        app.ui.panels.removal.iter().copied().filter(|&id| app.session.history.is_unsaved(id)).collect();
     let names: Vec<String> =
         unsaved.iter().filter_map(|&id| app.document().layer(id)).map(|layer| layer.name.clone()).collect();
     let mut answer = None;
@@ -208,7 +213,7 @@ pub(super) fn removal(app: &mut App, context: &egui::Context) {
         });
     });
     if let Some((remove, export)) = answer.or_else(|| modal.should_close().then_some((false, false))) {
-        let ids = std::mem::take(&mut app.panels.removal);
+        let ids = std::mem::take(&mut app.ui.panels.removal);
         if remove {
             remove_now(app, &ids);
         }
@@ -226,10 +231,10 @@ fn place_text(place: DVec3) -> String {
 
 /// The window with information on the inspected point.
 pub(super) fn inspected(app: &mut App, context: &egui::Context) {
-    let Some(point) = app.tools.inspected.clone() else { return };
+    let Some(point) = app.ui.tools.inspected.clone() else { return };
     let mut open = true;
     let window = egui::Window::new("Point").open(&mut open).resizable(true).default_width(260.0);
-    window.default_pos(app.view_rect.right_top() + egui::vec2(-290.0, 10.0)).show(context, |ui| {
+    window.default_pos(app.view.rect.right_top() + egui::vec2(-290.0, 10.0)).show(context, |ui| {
         egui::ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
             egui::Grid::new("point").num_columns(2).striped(true).show(ui, |ui| {
                 let mut row = |name: &str, value: &str| {
@@ -238,7 +243,7 @@ pub(super) fn inspected(app: &mut App, context: &egui::Context) {
                     ui.end_row();
                 };
                 row("Input", &point.name);
-                if let Some(words) = app.playing.alignment(point.layer) {
+                if let Some(words) = app.session.playing.alignment(point.layer) {
                     row("Begins", &words);
                 }
                 row("Index", &point.point.to_string());
@@ -261,6 +266,6 @@ pub(super) fn inspected(app: &mut App, context: &egui::Context) {
         });
     });
     if !open {
-        app.tools.inspected = None;
+        app.ui.tools.inspected = None;
     }
 }

@@ -17,12 +17,12 @@ pub(crate) struct Naming {
 /// Starts to rename an input.
 pub(super) fn rename(app: &mut App, id: LayerId) {
     let Some(text) = app.document().layer(id).map(|layer| layer.name.clone()) else { return };
-    app.panels.naming = Some(Naming { layer: id, text, focused: false });
+    app.ui.panels.naming = Some(Naming { layer: id, text, focused: false });
 }
 
 /// Shows a text field instead of the name of an input that is being renamed. Returns whether it is.
 pub(super) fn naming(app: &mut App, ui: &mut egui::Ui, id: LayerId) -> bool {
-    let Some(mut naming) = app.panels.naming.take_if(|naming| naming.layer == id) else { return false };
+    let Some(mut naming) = app.ui.panels.naming.take_if(|naming| naming.layer == id) else { return false };
     let field = egui::TextEdit::singleline(&mut naming.text).desired_width(ui.available_width());
     let response = ui.add(field);
     if !naming.focused {
@@ -38,7 +38,7 @@ pub(super) fn naming(app: &mut App, ui: &mut egui::Ui, id: LayerId) -> bool {
         }
         return true;
     }
-    app.panels.naming = Some(naming);
+    app.ui.panels.naming = Some(naming);
     true
 }
 
@@ -47,7 +47,7 @@ pub(super) fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
     let layers = &app.document().layers;
     let (count, place) = (layers.len(), layers.iter().position(|layer| layer.id == id).unwrap_or(0));
     let path = layers.get(place).and_then(|layer| layer.path.clone());
-    let source = app.inputs.get(&id).map(|input| &input.source);
+    let source = app.session.inputs.get(&id).map(|input| &input.source);
     let again = source.is_some_and(|source| !matches!(source, Source::Scene(..) | Source::StandardInput));
     if ui.button("Rename…").clicked() {
         rename(app, id);
@@ -65,7 +65,7 @@ pub(super) fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
             ui.close();
         }
     }
-    let unsaved = app.history.is_unsaved(id);
+    let unsaved = app.session.history.is_unsaved(id);
     let reload = ui.add_enabled(again && !unsaved, egui::Button::new("Reload"));
     let reload = reload.on_hover_text("Read it again, from where it was read").on_disabled_hover_text(if unsaved {
         "It has unsaved edits, which would not fit the new points"

@@ -42,7 +42,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             ui.strong("Look");
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.small_button("Reset").on_hover_text("Restore the defaults").clicked() {
-                    app.look = Look::default();
+                    app.view.look = Look::default();
                 }
             });
         });
@@ -51,23 +51,23 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             section(ui, "Colour", |ui| color(app, ui));
             section(ui, "Light", |ui| light(app, ui));
             section(ui, "Points", |ui| {
-                ui.checkbox(&mut app.look.dots, "Raw points").on_hover_text("Dots instead of the surface (Tab)");
-                ui.add(Slider::new(&mut app.look.dot_size, 1..=8).text("dot size").suffix(" px"));
+                ui.checkbox(&mut app.view.look.dots, "Raw points").on_hover_text("Dots instead of the surface (Tab)");
+                ui.add(Slider::new(&mut app.view.look.dot_size, 1..=8).text("dot size").suffix(" px"));
             });
-            section(ui, "Surface", |ui| surface(&mut app.look.settings, ui));
+            section(ui, "Surface", |ui| surface(&mut app.view.look.settings, ui));
             section(ui, "Search", |ui| search(app, ui));
             section(ui, "Movement", |ui| {
-                let mut rate = 1000.0 / app.look.moving_ms;
+                let mut rate = 1000.0 / app.view.look.moving_ms;
                 let slider = Slider::new(&mut rate, 5.0..=60.0).text("pictures a second").fixed_decimals(0);
                 if ui.add(slider).on_hover_text("Higher rates are smoother, but coarser while the view moves").changed()
                 {
-                    app.look.moving_ms = 1000.0 / rate;
+                    app.view.look.moving_ms = 1000.0 / rate;
                 }
-                choose(ui, "two fingers", &mut app.look.two_fingers, &FINGERS);
+                choose(ui, "two fingers", &mut app.view.look.two_fingers, &FINGERS);
             });
         });
     });
-    app.panels.focus.part(shown.response.rect);
+    app.ui.panels.focus.part(shown.response.rect);
 }
 
 fn section(ui: &mut egui::Ui, name: &str, content: impl FnOnce(&mut egui::Ui)) {
@@ -85,10 +85,11 @@ fn choose<T: PartialEq + Clone>(ui: &mut egui::Ui, label: &str, value: &mut T, o
 
 fn color(app: &mut App, ui: &mut egui::Ui) {
     let fields: Vec<String> = app
+        .view
         .shot
         .as_ref()
         .map_or_else(Vec::new, |shot| shot.shown.cloud.fields().iter().map(|field| field.name.clone()).collect());
-    let shading = &mut app.look.settings.shading;
+    let shading = &mut app.view.look.settings.shading;
     let mut options = MODES.to_vec();
     for field in &fields {
         let mode = if field == "Classification" { ColorMode::Classification } else { ColorMode::Field(field.clone()) };
@@ -126,13 +127,13 @@ fn color(app: &mut App, ui: &mut egui::Ui) {
 }
 
 fn light(app: &mut App, ui: &mut egui::Ui) {
-    let shading = &mut app.look.settings.shading;
+    let shading = &mut app.view.look.settings.shading;
     ui.checkbox(&mut shading.lighting, "Light").on_hover_text("Otherwise colours are shown unchanged");
     ui.horizontal(|ui| {
         let mut given = shading.exposure.is_some();
         let hint = "Brightness of the points' own colours; by default only dark clouds are brightened";
         if ui.checkbox(&mut given, "exposure").on_hover_text(hint).changed() {
-            let usual = app.shot.as_ref().map_or(1.0, |shot| usual_exposure(&shot.shown.cloud));
+            let usual = app.view.shot.as_ref().map_or(1.0, |shot| usual_exposure(&shot.shown.cloud));
             shading.exposure = given.then_some(usual);
         }
         if let Some(exposure) = &mut shading.exposure {
@@ -192,11 +193,11 @@ fn surface(settings: &mut Settings, ui: &mut egui::Ui) {
 }
 
 fn search(app: &mut App, ui: &mut egui::Ui) {
-    choose(ui, "backend", &mut app.look.backend, &BACKENDS);
-    let reconstruction = &mut app.look.settings.reconstruction;
+    choose(ui, "backend", &mut app.view.look.backend, &BACKENDS);
+    let reconstruction = &mut app.view.look.settings.reconstruction;
     let first_radius = match reconstruction.engine {
         SearchEngine::KdTree { first_radius } => first_radius,
-        _ => app.shot.as_ref().map_or(0.01, |shot| first_radius(&shot.shown.cloud)),
+        _ => app.view.shot.as_ref().map_or(0.01, |shot| first_radius(&shot.shown.cloud)),
     };
     let engines = [
         ("screen grid", SearchEngine::ScreenGrid),

@@ -11,12 +11,12 @@ use crate::measure::{Ruler, angle_text};
 use crate::tools::ruler;
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
-    if app.tool != Tool::Measure || app.tools.measured.is_empty() {
+    if app.ui.tool != Tool::Measure || app.ui.tools.measured.is_empty() {
         return;
     }
-    let report = Report::new(&ruler(app), &app.tools.measured);
+    let report = Report::new(&ruler(app), &app.ui.tools.measured);
     let mut open = true;
-    let place = app.view_rect.right_top() + egui::vec2(-16.0, 310.0);
+    let place = app.view.rect.right_top() + egui::vec2(-16.0, 310.0);
     let window = egui::Window::new("Measurement")
         .open(&mut open)
         .resizable(true)
@@ -39,18 +39,18 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         ui.horizontal(|ui| {
             if ui.button("Copy").on_hover_text("As text, a line each").clicked() {
                 context.copy_text(report.text());
-                app.messages.note("The measurement was copied");
+                app.ui.messages.note("The measurement was copied");
             }
             if ui.button("Remove last").on_hover_text("The last corner (Backspace)").clicked() {
-                app.tools.measured.pop();
+                app.ui.tools.measured.pop();
             }
             if ui.button("Clear").clicked() {
-                app.tools.measured.clear();
+                app.ui.tools.measured.clear();
             }
         });
     });
     if !open {
-        app.tools.measured.clear();
+        app.ui.tools.measured.clear();
     }
 }
 

@@ -18,12 +18,12 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             tools(app, ui);
         });
     });
-    app.panels.focus.part(shown.response.rect);
+    app.ui.panels.focus.part(shown.response.rect);
 }
 
 fn file(app: &mut App, ui: &mut egui::Ui) {
     command_button(app, ui, Command::Open, true);
-    let recent = app.recent.clone();
+    let recent = app.session.recent.clone();
     ui.add_enabled_ui(!recent.is_empty(), |ui| {
         ui.menu_button("Open recent", |ui| {
             for kept in recent {
@@ -41,13 +41,13 @@ fn file(app: &mut App, ui: &mut egui::Ui) {
     command_button(app, ui, Command::Film, any);
     command_button(app, ui, Command::SaveState, any);
     ui.separator();
-    let open = any || !app.loader.jobs().is_empty() || !app.playing.is_empty();
+    let open = any || !app.session.loader.jobs().is_empty() || !app.session.playing.is_empty();
     command_button(app, ui, Command::CloseAll, open);
     command_button(app, ui, Command::Quit, true);
 }
 
 fn edit(app: &mut App, ui: &mut egui::Ui) {
-    let steps = [app.history.undo_label(), app.history.redo_label()].map(|label| label.is_some());
+    let steps = [app.session.history.undo_label(), app.session.history.redo_label()].map(|label| label.is_some());
     command_button(app, ui, Command::Undo, steps[0]);
     command_button(app, ui, Command::Redo, steps[1]);
     ui.separator();
@@ -86,14 +86,14 @@ fn view(app: &mut App, ui: &mut egui::Ui) {
     ui.separator();
     command_button(app, ui, Command::Projection, true);
     ui.horizontal(|ui| {
-        let mut fov = app.navigation.fov_deg();
+        let mut fov = app.view.navigation.fov_deg();
         let number = egui::DragValue::new(&mut fov).range(5.0..=120.0).max_decimals(1).suffix("°");
         if ui
             .add(number)
             .on_hover_text("Vertical field of view; the surroundings of the pivot keep their size")
             .changed()
         {
-            app.navigation.set_fov_deg(fov);
+            app.view.navigation.set_fov_deg(fov);
         }
         ui.label("Field of view");
     });
@@ -105,7 +105,7 @@ fn view(app: &mut App, ui: &mut egui::Ui) {
     ui.separator();
     command_button(app, ui, Command::Dots, any);
     ui.separator();
-    let [moves, timeline] = [!app.playing.is_empty(), app.playing.has_timeline()];
+    let [moves, timeline] = [!app.session.playing.is_empty(), app.session.playing.has_timeline()];
     command_button(app, ui, Command::Play, moves);
     for command in [Command::StepBack, Command::StepForward, Command::PlayFromHere, Command::PlayToHere] {
         command_button(app, ui, command, timeline);
@@ -121,7 +121,7 @@ fn window(app: &mut App, ui: &mut egui::Ui) {
         command_button(app, ui, command, true);
     }
     ui.separator();
-    ui.checkbox(&mut app.look.overlay, "Axes and scale bar");
+    ui.checkbox(&mut app.view.look.overlay, "Axes and scale bar");
     ui.separator();
     let mut theme = ui.ctx().options(|options| options.theme_preference);
     let themes = [
@@ -141,16 +141,16 @@ fn tools(app: &mut App, ui: &mut egui::Ui) {
     for tool in Tool::ALL {
         let command = Command::Tool(tool);
         let tooltip = format!("{} ({})", command.tooltip(), command.key(&context));
-        if ui.selectable_label(app.tool == tool, tool.name()).on_hover_text(tooltip).clicked() {
+        if ui.selectable_label(app.ui.tool == tool, tool.name()).on_hover_text(tooltip).clicked() {
             crate::keys::run(app, &context, command);
         }
     }
-    if app.tool.selects() {
+    if app.ui.tool.selects() {
         ui.separator();
-        ui.checkbox(&mut app.tools.through, "Through").on_hover_text("Also select points behind the surface");
+        ui.checkbox(&mut app.ui.tools.through, "Through").on_hover_text("Also select points behind the surface");
     }
-    if app.tool == Tool::Brush {
-        let radius = egui::DragValue::new(&mut app.tools.brush).range(2.0..=300.0).suffix(" px");
+    if app.ui.tool == Tool::Brush {
+        let radius = egui::DragValue::new(&mut app.ui.tools.brush).range(2.0..=300.0).suffix(" px");
         ui.add(radius).on_hover_text("Radius of the brush");
     }
 }

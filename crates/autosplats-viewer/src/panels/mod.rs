@@ -121,14 +121,14 @@ impl Panels {
 
 /// Shows the panels beside the picture.
 pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
-    app.panels.focus.begin();
+    app.ui.panels.focus.begin();
     menu::show(app, ui);
     status::show(app, ui);
     timeline::show(app, ui);
-    if app.panels.inputs {
+    if app.ui.panels.inputs {
         inputs::show(app, ui);
     }
-    if app.panels.look {
+    if app.ui.panels.look {
         look::show(app, ui);
     }
 }
@@ -149,23 +149,28 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     pose::show(app, context);
     inputs::removal(app, context);
     leave(app, context);
-    app.panels.entered = false;
+    app.ui.panels.entered = false;
     focus::ring(app, context);
 }
 
 /// Asks before leaving would lose edits.
 fn leave(app: &mut App, context: &egui::Context) {
     let asked = context.input(|input| input.viewport().close_requested());
-    let writing = app.panels.export.is_writing();
-    if asked && !app.quit && (writing || app.history.is_changed_since_saved()) {
+    let writing = app.ui.panels.export.is_writing();
+    if asked && !app.ui.quit && (writing || app.session.history.is_changed_since_saved()) {
         context.send_viewport_cmd(egui::ViewportCommand::CancelClose);
-        app.panels.leave = true;
+        app.ui.panels.leave = true;
     }
-    if !app.panels.leave {
+    if !app.ui.panels.leave {
         return;
     }
-    let names: Vec<String> =
-        app.history.unsaved().filter_map(|id| app.document().layer(id)).map(|layer| layer.name.clone()).collect();
+    let names: Vec<String> = app
+        .session
+        .history
+        .unsaved()
+        .filter_map(|id| app.document().layer(id))
+        .map(|layer| layer.name.clone())
+        .collect();
     let modal = egui::Modal::new(egui::Id::unique("leave")).show(context, |ui| {
         if writing {
             ui.heading("A file is being written");
@@ -178,20 +183,20 @@ fn leave(app: &mut App, context: &egui::Context) {
         ui.add_space(8.0);
         ui.horizontal(|ui| {
             if main_button(ui, "Export…").clicked() {
-                app.panels.leave = false;
+                app.ui.panels.leave = false;
                 export::open(app);
             }
             if ui.button("Leave without saving").clicked() {
-                app.quit = true;
-                app.panels.leave = false;
+                app.ui.quit = true;
+                app.ui.panels.leave = false;
             }
             if ui.button("Stay").clicked() {
-                app.panels.leave = false;
+                app.ui.panels.leave = false;
             }
         });
     });
     if modal.should_close() {
-        app.panels.leave = false;
+        app.ui.panels.leave = false;
     }
 }
 

@@ -16,12 +16,12 @@ pub(crate) struct MoveNumbers {
 }
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
-    if app.tool != Tool::Move {
+    if app.ui.tool != Tool::Move {
         return;
     }
     let selected = app.counts().all.selected;
     let mut act = None;
-    let place = app.view_rect.right_top() + egui::vec2(-16.0, 310.0);
+    let place = app.view.rect.right_top() + egui::vec2(-16.0, 310.0);
     egui::Window::new("Move")
         .resizable(false)
         .default_width(250.0)
@@ -34,7 +34,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
                 return;
             }
             let speed = speed(app);
-            let numbers = &mut app.panels.moving;
+            let numbers = &mut app.ui.panels.moving;
             egui::Grid::new("move").num_columns(2).show(ui, |ui| {
                 for (axis, name) in ["dx", "dy", "dz"].into_iter().enumerate() {
                     ui.label(name);
@@ -62,8 +62,8 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             ui.small("Or drag the arrows and rings in the picture;\nwith Ctrl they turn by steps of 15°.");
         });
     let Some(act) = act else { return };
-    let (way, radians) = (app.panels.moving.way, app.panels.moving.degrees.to_radians());
-    let axis = app.panels.moving.axis.map_or(app.up(), |axis| DVec3::AXES[axis]);
+    let (way, radians) = (app.ui.panels.moving.way, app.ui.panels.moving.degrees.to_radians());
+    let axis = app.ui.panels.moving.axis.map_or(app.up(), |axis| DVec3::AXES[axis]);
     match act {
         Act::Move => app.edit_points("Move", |document| document.move_selected(&DMat4::from_translation(way))),
         Act::Turn => app.edit_points("Turn", |document| document.rotate_selected(axis, radians)),
@@ -77,6 +77,6 @@ enum Act {
 
 /// Change of a number per screen point dragged, world units: a thousandth of the picture's height at the pivot.
 fn speed(app: &App) -> f64 {
-    let speed = app.navigation.height_at_pivot() * 1e-3;
+    let speed = app.view.navigation.height_at_pivot() * 1e-3;
     if speed > 0.0 && speed.is_finite() { speed } else { 0.01 }
 }

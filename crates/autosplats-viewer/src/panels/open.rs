@@ -25,20 +25,20 @@ impl Dialogs {
 }
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
-    match app.panels.dialogs.chosen.as_ref().map(Receiver::try_recv) {
+    match app.ui.panels.dialogs.chosen.as_ref().map(Receiver::try_recv) {
         // Without a system dialog, the text field is shown.
         Some(Ok(None)) => {
-            app.panels.dialogs.chosen = None;
-            app.panels.dialogs.typed.get_or_insert_default();
+            app.ui.panels.dialogs.chosen = None;
+            app.ui.panels.dialogs.typed.get_or_insert_default();
         }
         Some(Ok(Some(paths))) => {
-            app.panels.dialogs.chosen = None;
+            app.ui.panels.dialogs.chosen = None;
             paths.into_iter().for_each(|path| app.open(Input::file(path)));
         }
-        Some(Err(TryRecvError::Disconnected)) => app.panels.dialogs.chosen = None,
+        Some(Err(TryRecvError::Disconnected)) => app.ui.panels.dialogs.chosen = None,
         Some(Err(TryRecvError::Empty)) | None => {}
     }
-    let Some(typed) = &mut app.panels.dialogs.typed else { return };
+    let Some(typed) = &mut app.ui.panels.dialogs.typed else { return };
     let mut input = None;
     let mut closed = false;
     let modal = egui::Modal::new(egui::Id::unique("open")).show(context, |ui| {
@@ -62,10 +62,10 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
                 app.open(input);
                 closed = true;
             }
-            Err(error) => app.messages.error(error.to_string()),
+            Err(error) => app.ui.messages.error(error.to_string()),
         }
     }
     if closed || modal.should_close() {
-        app.panels.dialogs.typed = None;
+        app.ui.panels.dialogs.typed = None;
     }
 }

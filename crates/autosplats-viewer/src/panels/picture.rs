@@ -31,22 +31,22 @@ impl Default for PictureDialog {
 }
 
 pub(crate) fn open(app: &mut App) {
-    app.panels.picture.target.open();
-    app.panels.picture.open = true;
+    app.ui.panels.picture.target.open();
+    app.ui.panels.picture.open = true;
 }
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
     arrived(app);
-    if !app.panels.picture.open {
+    if !app.ui.panels.picture.open {
         return;
     }
     let mut open = true;
     let mut write = None;
-    let seen = app.shot.as_ref().map(|shot| shot.size);
+    let seen = app.view.shot.as_ref().map(|shot| shot.size);
     let window = egui::Window::new("Save picture").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(app.view_rect.center() - egui::vec2(220.0, 110.0)).show(context, |ui| {
+    window.default_pos(app.view.rect.center() - egui::vec2(220.0, 110.0)).show(context, |ui| {
         ui.set_width(420.0);
-        let dialog = &mut app.panels.picture;
+        let dialog = &mut app.ui.panels.picture;
         ui.checkbox(&mut dialog.window, "The whole window, with menus");
         ui.add_enabled_ui(!dialog.window, |ui| {
             ui.horizontal(|ui| {
@@ -69,11 +69,11 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             check_memory("this picture", bytes).err().map(|error| error.to_string())
         };
         let words = DialogTexts { title: "Save picture", name: "picture.png", verb: "Save" };
-        write = dialog.target.show(ui, &words, &mut app.panels.entered, problem);
+        write = dialog.target.show(ui, &words, &mut app.ui.panels.entered, problem);
     });
-    app.panels.picture.open = open;
+    app.ui.panels.picture.open = open;
     let Some(Write { path, replace, .. }) = write else { return };
-    let dialog = &mut app.panels.picture;
+    let dialog = &mut app.ui.panels.picture;
     if !replace && path.exists() {
         dialog.target.refuse(&path, "This file exists already", true);
         return;
@@ -88,16 +88,16 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     } else {
         let size = dialog.size;
         let wish: RenderRequest = app.wish(size, false);
-        app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::File(path) });
+        app.view.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::File(path) });
     }
 }
 
 /// Writes the screenshot of the window once it arrives.
 fn arrived(app: &mut App) {
-    let Some(image) = app.panels.picture.expected.as_ref().and_then(|(receiver, _)| receiver.try_recv().ok()) else {
+    let Some(image) = app.ui.panels.picture.expected.as_ref().and_then(|(receiver, _)| receiver.try_recv().ok()) else {
         return;
     };
-    let Some((_, path)) = app.panels.picture.expected.take() else { return };
+    let Some((_, path)) = app.ui.panels.picture.expected.take() else { return };
     let [width, height] = image.size.map(|side| side as u32);
     let pixels = image.pixels.iter().map(egui::Color32::to_srgba_unmultiplied).collect();
     let picture = autosplats::Image { width, height, pixels, linear: Vec::new() };

@@ -63,11 +63,11 @@ pub(super) fn open(app: &mut App, id: LayerId) {
     let middle = layer.bounds().map_or(DVec3::ZERO, |[low, high]| low.midpoint(high));
     let middle = layer.pose.inverse().transform_point3(middle);
     let parts = Parts::new(&layer.pose, middle);
-    app.panels.pose = Some(Pose { layer: id, middle, parts, made: layer.pose, before: None });
+    app.ui.panels.pose = Some(Pose { layer: id, middle, parts, made: layer.pose, before: None });
 }
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
-    let Some(mut pose) = app.panels.pose.take() else { return };
+    let Some(mut pose) = app.ui.panels.pose.take() else { return };
     let Some(layer) = app.document().layer(pose.layer) else { return };
     let (name, opened_at) = (layer.name.clone(), layer.opened_at);
     if layer.pose != pose.made {
@@ -75,10 +75,10 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
     let mut open = true;
     let mut busy = false;
-    let speed = (app.navigation.height_at_pivot() * 1e-3).max(1e-9);
+    let speed = (app.view.navigation.height_at_pivot() * 1e-3).max(1e-9);
     let mut wanted = None;
     let window = egui::Window::new(format!("Place of {name}")).id(egui::Id::unique("pose"));
-    let window = window.open(&mut open).resizable(false).default_pos(app.view_rect.left_top() + egui::vec2(16.0, 16.0));
+    let window = window.open(&mut open).resizable(false).default_pos(app.view.rect.left_top() + egui::vec2(16.0, 16.0));
     window.show(context, |ui| {
         let mut parts = pose.parts;
         busy = numbers(ui, &mut parts, speed);
@@ -109,7 +109,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     if !busy || !open {
         settle(app, &mut pose);
     }
-    app.panels.pose = open.then_some(pose);
+    app.ui.panels.pose = open.then_some(pose);
 }
 
 /// Shows the numbers. Returns whether one of them is being dragged or typed.

@@ -20,35 +20,35 @@ impl Default for Session {
 
 /// Opens the dialog. The proposed file is the present session file, if there is one.
 pub(crate) fn open(app: &mut App) {
-    if let Some(path) = &app.state {
-        app.panels.session.target = TargetFile::new(path.display().to_string());
+    if let Some(path) = &app.session.file {
+        app.ui.panels.session.target = TargetFile::new(path.display().to_string());
     }
-    app.panels.session.target.open();
-    app.panels.session.open = true;
+    app.ui.panels.session.target.open();
+    app.ui.panels.session.open = true;
 }
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
-    let mut open = app.panels.session.open;
+    let mut open = app.ui.panels.session.open;
     let mut write = None;
     let window = egui::Window::new("Save session").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(app.view_rect.center() - egui::vec2(220.0, 60.0)).show(context, |ui| {
+    window.default_pos(app.view.rect.center() - egui::vec2(220.0, 60.0)).show(context, |ui| {
         ui.set_width(420.0);
         let words = DialogTexts { title: "Save session", name: "autosplats.json", verb: "Save" };
-        let (target, entered) = (&mut app.panels.session.target, &mut app.panels.entered);
+        let (target, entered) = (&mut app.ui.panels.session.target, &mut app.ui.panels.entered);
         let folder = target.path().is_dir().then(|| "This is a folder".into());
         write = target.show(ui, &words, entered, folder);
     });
-    app.panels.session.open = open;
+    app.ui.panels.session.open = open;
     let Some(write) = write else { return };
     if !write.replace && write.path.exists() {
-        app.panels.session.target.refuse(&write.path, "This file exists already", true);
+        app.ui.panels.session.target.refuse(&write.path, "This file exists already", true);
         return;
     }
     match State::of(app).write(&write.path) {
         Ok(()) => {
-            app.messages.note(format!("{} was written; 'autosplats --state' restores it", write.path.display()));
-            app.panels.session.open = false;
+            app.ui.messages.note(format!("{} was written; 'autosplats --state' restores it", write.path.display()));
+            app.ui.panels.session.open = false;
         }
-        Err(error) => app.panels.session.target.refuse(&write.path, error, false),
+        Err(error) => app.ui.panels.session.target.refuse(&write.path, error, false),
     }
 }

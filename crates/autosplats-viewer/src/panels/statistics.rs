@@ -21,8 +21,8 @@ const STAGES: [Stage; 6] = [
 ];
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
-    let mut open = app.panels.statistics;
-    let place = app.view_rect.left_bottom() + egui::vec2(10.0, -320.0);
+    let mut open = app.ui.panels.statistics;
+    let place = app.view.rect.left_bottom() + egui::vec2(10.0, -320.0);
     let window = egui::Window::new("Statistics").open(&mut open).default_pos(place).default_width(330.0);
     window.show(context, |ui| {
         Plot::new("stages")
@@ -35,9 +35,9 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             .include_y(0.0)
             .y_axis_label("ms")
             .show(ui, |plot| {
-                let mut below: Vec<f64> = vec![0.0; app.rate.timings.len()];
+                let mut below: Vec<f64> = vec![0.0; app.view.rate.timings.len()];
                 for (name, value, color) in STAGES {
-                    let bars = app.rate.timings.iter().zip(&mut below).enumerate().map(|(x, (timings, below))| {
+                    let bars = app.view.rate.timings.iter().zip(&mut below).enumerate().map(|(x, (timings, below))| {
                         let value = value(timings);
                         let bar = Bar::new(x as f64, value).base_offset(*below).width(1.0).fill(color);
                         *below += value;
@@ -46,7 +46,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
                     plot.bar_chart(BarChart::new(name, bars.collect()).color(color));
                 }
             });
-        let Some(picture) = &app.shot else { return };
+        let Some(picture) = &app.view.shot else { return };
         egui::Grid::new("timings").num_columns(4).striped(true).show(ui, |ui| {
             for pair in STAGES.chunks(2) {
                 for (name, value, color) in pair {
@@ -76,5 +76,5 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             grouped(counts.covered)
         ));
     });
-    app.panels.statistics = open;
+    app.ui.panels.statistics = open;
 }

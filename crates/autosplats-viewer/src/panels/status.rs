@@ -16,14 +16,14 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
                 let color = ui.visuals().warn_fg_color;
                 ui.colored_label(color, format!("{} selected", grouped(counts.selected)));
             }
-            if let Some(picture) = &app.shot {
+            if let Some(picture) = &app.view.shot {
                 ui.separator();
                 ui.label(format!("{} visible", grouped(picture.counts.visible)))
                     .on_hover_text("Points that own a pixel or half of one");
                 ui.separator();
                 ui.label(format!("{:.0} ms", picture.milliseconds))
                     .on_hover_text("Render time of the last picture (P shows more)");
-                if let Some(rate) = app.rate.per_second() {
+                if let Some(rate) = app.view.rate.per_second() {
                     ui.label(format!("{rate:.0} fps"));
                 }
                 if let Some(remark) = &picture.remark {
@@ -34,10 +34,10 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
                 }
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let device = app.device.as_ref().map_or("CPU", |device| &*device.name);
+                let device = app.view.device.as_ref().map_or("CPU", |device| &*device.name);
                 ui.weak(device).on_hover_text("Device that renders the pictures");
                 let [points, undo] = [bytes, old_bytes].map(|bytes| bytes as f64 * 1e-6);
-                let all = app.panels.memory.bytes(ui.input(|input| input.time)).map(|bytes| bytes as f64 * 1e-6);
+                let all = app.ui.panels.memory.bytes(ui.input(|input| input.time)).map(|bytes| bytes as f64 * 1e-6);
                 ui.weak(format!("{:.0} MB", all.unwrap_or(points + undo)))
                     .on_hover_text(format!("Memory of this program; points {points:.0} MB, undo {undo:.0} MB"));
             });
@@ -47,7 +47,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     // The line has no controls, but screen readers can reach it.
     let line = ui.interact(rect, egui::Id::unique("status line"), egui::Sense::focusable_noninteractive());
     line.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, "Status"));
-    app.panels.focus.part(rect);
+    app.ui.panels.focus.part(rect);
 }
 
 /// Memory of the program, queried once a second.

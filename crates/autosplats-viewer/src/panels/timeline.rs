@@ -7,17 +7,17 @@ use crate::commands::Command;
 use crate::playing::SPEEDS;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
-    if app.playing.is_empty() {
+    if app.session.playing.is_empty() {
         return;
     }
     let shown = egui::Panel::bottom("timeline").show(ui, |ui| {
         ui.add_space(2.0);
         ui.horizontal(|ui| {
-            let timeline = app.playing.has_timeline();
+            let timeline = app.session.playing.has_timeline();
             if timeline {
                 button(app, ui, Command::StepBack, ButtonSymbol::Back);
             }
-            let sign = if app.playing.clock.playing { ButtonSymbol::Pause } else { ButtonSymbol::Play };
+            let sign = if app.session.playing.clock.playing { ButtonSymbol::Pause } else { ButtonSymbol::Play };
             button(app, ui, Command::Play, sign);
             if timeline {
                 button(app, ui, Command::StepForward, ButtonSymbol::Forward);
@@ -33,7 +33,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
         });
         ui.add_space(2.0);
     });
-    app.panels.focus.part(shown.response.rect);
+    app.ui.panels.focus.part(shown.response.rect);
 }
 
 /// A symbol drawn on a button, since the fonts have no such glyphs.
@@ -85,13 +85,13 @@ fn button(app: &mut App, ui: &mut egui::Ui, command: Command, sign: ButtonSymbol
 
 /// Counts of live updates.
 fn statistics(app: &App, ui: &mut egui::Ui) {
-    let statistics = app.playing.statistics();
+    let statistics = app.session.playing.statistics();
     if statistics.refused > 0 {
         let why = statistics.last_refusal.unwrap_or_default();
         let text = format!("{} refused", statistics.refused);
         ui.colored_label(ui.visuals().warn_fg_color, text).on_hover_text(why);
     }
-    if app.playing.is_live() {
+    if app.session.playing.is_live() {
         if statistics.dropped > 0 {
             ui.weak(format!("{} dropped", statistics.dropped))
                 .on_hover_text("Replaced by newer points before they were shown");
@@ -105,7 +105,7 @@ fn statistics(app: &App, ui: &mut egui::Ui) {
 }
 
 fn speed(app: &mut App, ui: &mut egui::Ui) {
-    let clock = &mut app.playing.clock;
+    let clock = &mut app.session.playing.clock;
     ui.checkbox(&mut clock.looped, "Loop").on_hover_text("Start again at the end");
     let number = egui::DragValue::new(&mut clock.speed).range(SPEEDS).speed(0.01).max_decimals(2).suffix("×");
     let response = ui.add(number).on_hover_text("Seconds played per second");
@@ -120,8 +120,9 @@ fn speed(app: &mut App, ui: &mut egui::Ui) {
 }
 
 fn times(app: &mut App, ui: &mut egui::Ui) {
-    let frame = app.playing.frame().map(|(frame, frames)| format!("  frame {frame} of {frames}")).unwrap_or_default();
-    let clock = &mut app.playing.clock;
+    let frame =
+        app.session.playing.frame().map(|(frame, frames)| format!("  frame {frame} of {frames}")).unwrap_or_default();
+    let clock = &mut app.session.playing.clock;
     let (mut position, length) = (clock.position(), clock.length());
     ui.monospace(format!("{position:.2} / {length:.2} s{frame}"));
     ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(60.0);

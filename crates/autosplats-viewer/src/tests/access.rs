@@ -22,7 +22,7 @@ fn everything_that_can_be_used_has_a_name() {
     window.press(Key::C);
     crate::keys::run(window.harness.state_mut(), &context, Command::Screenshot);
     window.steps(3);
-    assert!(window.says("Radius of the brush") || window.app().tool == Tool::Brush, "C takes the brush");
+    assert!(window.says("Radius of the brush") || window.app().ui.tool == Tool::Brush, "C takes the brush");
     look(&window, "picture, help and brush");
     window.key(CTRL, Key::T);
     window.steps(3);
@@ -94,7 +94,7 @@ fn a_small_window_has_room_for_everything() {
         window.steps(4);
         let (_, outside) = crowding(&window);
         assert!(outside.is_empty(), "{command:?}: {outside:#?}");
-        let panels = &mut window.harness.state_mut().panels;
+        let panels = &mut window.harness.state_mut().ui.panels;
         (panels.export.open, panels.picture.open, panels.help, panels.film.open) = (false, false, false, false);
         window.steps(2);
     }

@@ -13,7 +13,7 @@ fn ask(window: &mut Window, command: Command, path: &Path) {
     window.steps(3);
     if command == Command::Film {
         // A full film of two hundred large pictures would test nothing more.
-        window.harness.state_mut().panels.film.still_for_tests();
+        window.harness.state_mut().ui.panels.film.still_for_tests();
         // The film dialog leaves the keyboard to the picture, so the field has to be focused.
         let line = window.harness.get_by_role(Role::TextInput);
         line.focus();
@@ -33,7 +33,7 @@ const DIALOGS: [(Command, &str); 4] = [
 ];
 
 fn is_open(window: &Window, command: Command) -> bool {
-    let panels = &window.app().panels;
+    let panels = &window.app().ui.panels;
     match command {
         Command::Export => panels.export.open,
         Command::Screenshot => panels.picture.open,
@@ -55,7 +55,7 @@ fn enter_writes_and_replaces_nothing() {
         ask(&mut window, command, &folder.path().join(name));
         window.press(Key::Enter);
         let file = written(folder.path(), name);
-        window.until(name, |window| file.is_file() && window.app().recording.is_none());
+        window.until(name, |window| file.is_file() && window.app().view.recording.is_none());
         window.until("it is told", |window| window.says("writ"));
         window.settle();
         (0..3).for_each(|_| window.press(Key::Escape));
@@ -73,7 +73,7 @@ fn enter_writes_and_replaces_nothing() {
         assert!(is_open(&window, command), "{name}: the question stays");
         window.click_on("Replace it");
         window.until(name, |window| {
-            window.app().recording.is_none() && std::fs::read(&file).is_ok_and(|bytes| bytes != b"mine")
+            window.app().view.recording.is_none() && std::fs::read(&file).is_ok_and(|bytes| bytes != b"mine")
         });
         window.settle();
         (0..3).for_each(|_| window.press(Key::Escape));
@@ -147,5 +147,5 @@ fn enter_leaves_by_exporting() {
     window.steps(3);
     assert!(window.says("Edits are not saved"), "it is asked");
     window.press(Key::Enter);
-    assert!(window.app().panels.export.open && !window.app().quit, "Enter does no harm");
+    assert!(window.app().ui.panels.export.open && !window.app().ui.quit, "Enter does no harm");
 }

@@ -77,10 +77,10 @@ fn leaving_with_edits_asks() {
     assert!(!close(&mut window), "the window stays");
     assert!(window.says("Edits are not saved") && window.says(STATUE), "and says why: {:?}", window.words());
     window.click_on("Stay");
-    assert!(!window.says("Edits are not saved") && !window.app().quit, "staying is possible");
+    assert!(!window.says("Edits are not saved") && !window.app().ui.quit, "staying is possible");
     assert!(!close(&mut window), "it asks again");
     window.commands.clear();
     window.click_on("Leave without saving");
-    assert!(window.app().quit && window.commands.contains(&ViewportCommand::Close), "leaving is possible");
+    assert!(window.app().ui.quit && window.commands.contains(&ViewportCommand::Close), "leaving is possible");
     assert!(close(&mut window), "now it closes");
 }

@@ -102,16 +102,16 @@ impl Window {
         self.steps(2);
         self.until("the picture is whole", |window| {
             let app = window.app();
-            let asked = app.loader.jobs().is_empty() && !app.navigation.is_moving();
-            let empty = app.document().layers.is_empty() && app.shot.is_none();
+            let asked = app.session.loader.jobs().is_empty() && !app.view.navigation.is_moving();
+            let empty = app.document().layers.is_empty() && app.view.shot.is_none();
             asked
                 && (empty
-                    || app.shot.as_ref().is_some_and(|picture| {
+                    || app.view.shot.as_ref().is_some_and(|picture| {
                         let side = |points: f32| points.round() as u32;
                         let rect = window.picture();
                         picture.whole
-                            && picture.dots == app.look.dots
-                            && picture.camera == app.navigation.camera()
+                            && picture.dots == app.view.look.dots
+                            && picture.camera == app.view.navigation.camera()
                             && picture.size == [side(rect.width()), side(rect.height())]
                             && picture.shown.shows(app.document())
                     }))
@@ -209,5 +209,5 @@ fn what_is_not_there_is_not_found() {
     window.settle();
     assert!(window.says("Drop point clouds here"), "the welcome can be read");
     assert!(!window.says("Drop point clouds there"), "this is said nowhere");
-    assert!(window.app().shot.is_none(), "nothing is open, so there is no picture");
+    assert!(window.app().view.shot.is_none(), "nothing is open, so there is no picture");
 }

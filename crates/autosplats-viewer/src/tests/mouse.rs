@@ -8,19 +8,19 @@ use crate::commands::Tool;
 
 /// Position of a world position in the picture, by shares of its sides.
 fn share(window: &Window, camera: &Camera, world: DVec3) -> DVec2 {
-    let size = window.app().shot.as_ref().expect("there is a picture").size;
+    let size = window.app().view.shot.as_ref().expect("there is a picture").size;
     let (pixel, _) = camera.lens(size).expect("the camera sees").to_pixel(world).expect("it is before the eye");
     DVec2::new(pixel.x, pixel.y) / DVec2::new(size[0].into(), size[1].into())
 }
 
 /// World position of the surface at a place of the picture.
 fn surface(window: &Window, place: DVec2) -> DVec3 {
-    let picture = window.app().shot.as_ref().expect("there is a picture");
+    let picture = window.app().view.shot.as_ref().expect("there is a picture");
     picture.depths.world(&picture.camera, place).unwrap_or_else(|| panic!("there is a surface at {place}"))
 }
 
 fn camera(window: &Window) -> Camera {
-    window.app().navigation.camera()
+    window.app().view.navigation.camera()
 }
 
 fn forward(camera: &Camera) -> DVec3 {
@@ -111,7 +111,8 @@ fn a_double_click_makes_a_pivot() {
     let place = window.place(at.x as f32, at.y as f32);
     window.click(place);
     window.click(place);
-    window.until("there is another pivot", |window| window.app().navigation.goal_camera().look_at != before.look_at);
+    window
+        .until("there is another pivot", |window| window.app().view.navigation.goal_camera().look_at != before.look_at);
     window.settle();
     let found = share(&window, &before, camera(&window).look_at).distance(at);
     assert!(found < NEAR, "the pivot is under the cursor: {found}");
@@ -127,9 +128,9 @@ fn points_are_inspected_and_measured_where_they_are_clicked() {
     window.press(Key::X);
     let place = window.place(0.5, 0.45);
     window.click(place);
-    window.until("a point is told of", |window| window.app().tools.inspected.is_some());
+    window.until("a point is told of", |window| window.app().ui.tools.inspected.is_some());
     window.step();
-    let point = window.app().tools.inspected.clone().expect("it was waited for");
+    let point = window.app().ui.tools.inspected.clone().expect("it was waited for");
     assert!(window.says(&point.point.to_string()) && window.says("Index"), "its index can be read");
     for coordinate in &point.file_text {
         assert!(window.says(coordinate), "{coordinate} can be read");
@@ -137,16 +138,16 @@ fn points_are_inspected_and_measured_where_they_are_clicked() {
     let found = share(&window, &camera(&window), point.position).distance(DVec2::new(0.5, 0.45));
     assert!(found < NEAR, "it is where the click was: {found}");
     window.press(Key::M);
-    assert_eq!(window.app().tool, Tool::Measure, "M measures");
+    assert_eq!(window.app().ui.tool, Tool::Measure, "M measures");
     for (number, y) in [(1, 0.40), (2, 0.55)] {
         let place = window.place(0.5, y);
         window.click(place);
-        window.until("a corner is measured", |window| window.app().tools.measured.len() == number);
+        window.until("a corner is measured", |window| window.app().ui.tools.measured.len() == number);
     }
-    let [a, b] = [0, 1].map(|i| window.app().tools.measured[i]);
+    let [a, b] = [0, 1].map(|i| window.app().ui.tools.measured[i]);
     assert!(a.distance(b) > 0.0, "two places");
     window.press(Key::Escape);
-    assert!(window.app().tools.measured.is_empty(), "Escape gives the measurement up");
+    assert!(window.app().ui.tools.measured.is_empty(), "Escape gives the measurement up");
 }
 
 /// Scrolls by fingers or wheel over the middle of the picture.
@@ -169,10 +170,10 @@ fn two_fingers_do_what_was_chosen_and_a_wheel_zooms() {
     let distance = |camera: &Camera| camera.eye.distance(camera.look_at);
     let turned = |camera: &Camera| forward(&first).angle_between(forward(camera)).to_degrees();
     for fingers in [TwoFingers::Zoom, TwoFingers::Orbit, TwoFingers::Pan] {
-        window.harness.state_mut().look.two_fingers = fingers;
+        window.harness.state_mut().view.look.two_fingers = fingers;
         let ways = [(Unit::Point, Source::Trackpad), (Unit::Point, Source::Unknown), (Unit::Line, Source::Wheel)];
         for (unit, source) in ways {
-            window.harness.state_mut().navigation.go_to(&first, true);
+            window.harness.state_mut().view.navigation.go_to(&first, true);
             window.settle();
             let delta = if unit == Unit::Point { egui::vec2(40.0, 30.0) } else { egui::vec2(0.0, 2.0) };
             scroll(&mut window, unit, source, delta);
@@ -187,7 +188,7 @@ fn two_fingers_do_what_was_chosen_and_a_wheel_zooms() {
                 TwoFingers::Pan => assert!(!nearer && moved && turned(&now) < 1e-3, "{case}: moves"),
             }
         }
-        window.harness.state_mut().navigation.go_to(&first, true);
+        window.harness.state_mut().view.navigation.go_to(&first, true);
         window.settle();
         let place = window.place(0.5, 0.45);
         window.event(Event::PointerMoved(place));

@@ -31,13 +31,16 @@ fn what_is_live_goes_on_when_a_recording_has_ended() {
     let mut watched = frames(live.path(), 1);
     watched.play.watch = true;
     let mut window = playing(vec![frames(folder.path(), 3), watched]);
-    window.harness.state_mut().playing.clock.looped = false;
+    window.harness.state_mut().session.playing.clock.looped = false;
     window.until("the end", |window| {
-        let clock = &window.app().playing.clock;
+        let clock = &window.app().session.playing.clock;
         clock.position() == clock.length() && clock.length() > 0.0
     });
     window.steps(20);
-    assert!(window.app().playing.clock.playing && window.app().playing.is_live(), "only one of them has ended");
+    assert!(
+        window.app().session.playing.clock.playing && window.app().session.playing.is_live(),
+        "only one of them has ended"
+    );
     std::fs::write(live.path().join("frame_1.xyz"), "50 0 0\n51 0 0\n50 1 0\n").expect("a frame");
     window.until("newer points", |window| {
         let layers = &window.app().document().layers;
@@ -46,7 +49,7 @@ fn what_is_live_goes_on_when_a_recording_has_ended() {
     let live = window.app().document().layers.iter().find(|layer| layer.cloud.len() == 3).expect("it is there").id;
     window.harness.state_mut().give_up(live);
     window.steps(3);
-    assert!(!window.app().playing.clock.playing, "with nothing live it stops at its end");
+    assert!(!window.app().session.playing.clock.playing, "with nothing live it stops at its end");
 }
 
 #[test]
@@ -62,7 +65,7 @@ fn what_waits_is_in_the_list() {
     assert!(!window.says("Drop point clouds here") && !window.says("Nothing is open"), "something is open");
     window.click_on("×");
     window.steps(2);
-    assert!(window.says("Nothing is open") && window.app().playing.is_empty(), "it was given up");
+    assert!(window.says("Nothing is open") && window.app().session.playing.is_empty(), "it was given up");
 }
 
 #[test]
@@ -74,14 +77,14 @@ fn the_inspector_says_how_recordings_are_aligned() {
     let mut window = playing(twice);
     let words = |window: &Window| {
         let ids: Vec<_> = window.app().document().layers.iter().map(|layer| layer.id).collect();
-        ids.into_iter().map(|id| window.app().playing.alignment(id)).collect::<Vec<_>>()
+        ids.into_iter().map(|id| window.app().session.playing.alignment(id)).collect::<Vec<_>>()
     };
     let by_clock = |words: &[Option<String>]| {
         words.iter().all(|words| words.as_ref().is_some_and(|words| words.contains("by its time stamps")))
     };
     window.until("both are open", |window| by_clock(&words(window)));
     // Points of both inputs lie at the same places.
-    window.harness.state_mut().tools.inspected = {
+    window.harness.state_mut().ui.tools.inspected = {
         let document = window.app().document();
         document.describe(&document.shown(), 0)
     };
@@ -104,8 +107,8 @@ fn film(window: &mut Window, choice: &str, path: &Path) -> Vec<Vec<u8>> {
     window.key(CTRL, Key::A);
     window.event(Event::Text(path.display().to_string()));
     window.press(Key::Enter);
-    window.until("the film", |window| window.app().recording.is_some());
-    window.until("its end", |window| window.app().recording.is_none());
+    window.until("the film", |window| window.app().view.recording.is_some());
+    window.until("its end", |window| window.app().view.recording.is_none());
     // The dialog is open again.
     window.steps(2);
     let stem = path.file_stem().expect("a name").to_string_lossy().into_owned();
@@ -118,13 +121,13 @@ fn films_show_what_moves_or_stand_still() {
     let [folder, out] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
     let mut window = playing(vec![frames(folder.path(), 3)]);
     window.harness.state_mut().toggle_playing();
-    window.harness.state_mut().playing.clock.seek(0.0);
+    window.harness.state_mut().session.playing.clock.seek(0.0);
     window.settle();
     let context = window.harness.ctx.clone();
     crate::keys::run(window.harness.state_mut(), &context, Command::Film);
     window.steps(3);
     assert!(window.says("0.00 to 0.30 s at 1.00×, repeatedly"), "it runs: {:?}", window.words());
-    window.harness.state_mut().panels.film.still_for_tests();
+    window.harness.state_mut().ui.panels.film.still_for_tests();
     let once = film(&mut window, "runs once", &out.path().join("once.png"));
     assert_eq!(once.len(), 3, "ten a second for 0.3 s");
     assert!(once[0] != once[1] && once[1] != once[2], "each another frame, of the same camera");

@@ -12,7 +12,7 @@ use crate::storage;
 fn a_scene_is_shown_and_listed() {
     let window = Window::with_statue();
     let app = window.app();
-    let shot = app.shot.as_ref().expect("there is a picture");
+    let shot = app.view.shot.as_ref().expect("there is a picture");
     assert_eq!(app.document().layers.len(), 1, "one thing is open");
     assert!(window.says(STATUE), "its name is in the list: {:?}", window.words());
     let points = app.document().layers[0].cloud.len();
@@ -63,17 +63,17 @@ fn the_first_view_is_the_same_whoever_finds_it() {
     window.harness.state_mut().open(Input::file(path));
     window.until("it is read", |window| !window.app().document().layers.is_empty());
     window.settle();
-    let camera = window.app().navigation.goal_camera();
+    let camera = window.app().view.navigation.goal_camera();
     // The navigation keeps orientations as quaternions, whose conversion rounds.
     let same = |other: Camera| camera.eye.distance(other.eye) < 1e-6 && camera.look_at.distance(other.look_at) < 1e-6;
-    let (_, glance) = window.app().glance.clone().expect("the thread that read it has looked at it");
+    let (_, glance) = window.app().session.glance.clone().expect("the thread that read it has looked at it");
     assert!(glance.camera.is_some_and(same), "where it says: {glance:?} is not {camera:?}");
     let app = window.harness.state_mut();
-    app.glance = None;
-    app.navigation.orbit(autosplats::cloud::glam::DVec2::new(0.3, 0.1));
-    assert!(!same(app.navigation.goal_camera()), "the comparison can tell");
+    app.session.glance = None;
+    app.view.navigation.orbit(autosplats::cloud::glam::DVec2::new(0.3, 0.1));
+    assert!(!same(app.view.navigation.goal_camera()), "the comparison can tell");
     app.first_view();
-    assert!(same(app.navigation.goal_camera()), "as the window finds it by itself");
+    assert!(same(app.view.navigation.goal_camera()), "as the window finds it by itself");
 }
 
 #[test]
@@ -122,14 +122,14 @@ fn played() -> Input {
 #[test]
 fn settings_are_kept_between_starts() {
     let mut window = Window::new(&[]);
-    window.harness.state_mut().look.dot_size = 6;
-    window.harness.state_mut().look.two_fingers = crate::look::TwoFingers::Pan;
-    window.harness.state_mut().recent = vec![StoredInput::of(&played(), crate::loading::Appearance::default())];
+    window.harness.state_mut().view.look.dot_size = 6;
+    window.harness.state_mut().view.look.two_fingers = crate::look::TwoFingers::Pan;
+    window.harness.state_mut().session.recent = vec![StoredInput::of(&played(), crate::loading::Appearance::default())];
     let mut memory = Memory::default();
     storage::save(window.app(), &mut memory);
     let (look, recent) = storage::load(Some(&memory));
-    assert_eq!(look, window.app().look, "the look comes back");
-    assert_eq!(recent, window.app().recent, "and what was opened");
+    assert_eq!(look, window.app().view.look, "the look comes back");
+    assert_eq!(recent, window.app().session.recent, "and what was opened");
     let (again, _) = recent[0].clone().open(Path::new("")).expect("a recording");
     assert_eq!(again.play, played().play, "played as it was");
     let broken = memory.0.keys().map(|key| (key.clone(), "(((".to_owned())).collect();
@@ -143,7 +143,7 @@ fn settings_are_kept_between_starts() {
     );
     assert_eq!(storage::load(None).0, Look::default(), "nothing was kept");
     // Values that the renderer rejects become defaults too.
-    window.harness.state_mut().look.settings.reconstruction.k = 100_000;
+    window.harness.state_mut().view.look.settings.reconstruction.k = 100_000;
     storage::save(window.app(), &mut memory);
     assert_eq!(storage::load(Some(&memory)).0, Look::default(), "k of 100,000 is out of range");
 }

@@ -7,16 +7,16 @@ use super::*;
 /// The picture in the window once no work is left.
 fn at_rest(window: &mut Window) -> Image {
     window.settle();
-    window.until("all is done", |window| window.app().render.is_idle());
+    window.until("all is done", |window| window.app().view.render.is_idle());
     window.steps(2);
-    Image::clone(&window.app().shot.as_ref().expect("there is a picture").image)
+    Image::clone(&window.app().view.shot.as_ref().expect("there is a picture").image)
 }
 
 /// The same picture rendered by the library, supersampled and averaged.
 fn rendered(window: &Window, supersample: u32) -> Image {
     let app = window.app();
-    let shot = app.shot.as_ref().expect("there is a picture");
-    let mut settings = app.look.settings.clone();
+    let shot = app.view.shot.as_ref().expect("there is a picture");
+    let mut settings = app.view.look.settings.clone();
     settings.shading.legend = false;
     settings.shading.exposure.get_or_insert(usual_exposure(&shot.shown.cloud));
     let size = shot.size.map(|side| side * supersample);
@@ -31,7 +31,7 @@ fn a_picture_at_rest_becomes_finer() {
     let shown = at_rest(&mut window);
     assert_eq!(
         [shown.width, shown.height],
-        window.app().shot.as_ref().expect("a picture").size,
+        window.app().view.shot.as_ref().expect("a picture").size,
         "as large as the window's"
     );
     assert!(shown.pixels == rendered(&window, 2).pixels, "it is the one that was rendered larger");
@@ -45,7 +45,7 @@ fn what_is_selected_is_tinted_in_the_finer_picture() {
     window.key(CTRL, Key::A);
     let selected = at_rest(&mut window);
     let differ = plain.pixels.iter().zip(&selected.pixels).filter(|(one, other)| one != other).count();
-    let covered = window.app().shot.as_ref().expect("a picture").counts.covered;
+    let covered = window.app().view.shot.as_ref().expect("a picture").counts.covered;
     // At the rim of the outermost splats, a pixel may be covered in one of the two sizes only.
     assert!(differ + covered / 50 > covered, "{differ} of {covered} pixels have another colour");
 }

@@ -26,13 +26,13 @@ fn give(window: &mut Window, command: Command) {
 
 /// The present camera, moved to the side.
 fn elsewhere(window: &Window) -> Camera {
-    let camera = window.app().navigation.goal_camera();
+    let camera = window.app().view.navigation.goal_camera();
     let aside = DVec3::new(0.25, 0.5, 0.0);
     Camera { eye: camera.eye + aside, look_at: camera.look_at + aside, ..camera }
 }
 
 fn forward(window: &Window) -> DVec3 {
-    let camera = window.app().navigation.goal_camera();
+    let camera = window.app().view.navigation.goal_camera();
     (camera.look_at - camera.eye).normalize()
 }
 
@@ -53,10 +53,10 @@ fn wanted(direction: ViewDirection) -> Option<DVec3> {
 fn check(window: &mut Window, command: Command) {
     let counts = |window: &Window| window.app().document().counts();
     let before = counts(window);
-    let view = window.app().navigation.goal_camera();
-    let (dots, look) = (window.app().look.dots, window.app().panels.look);
-    let (inputs, statistics) = (window.app().panels.inputs, window.app().panels.statistics);
-    let orthographic = window.app().navigation.is_orthographic();
+    let view = window.app().view.navigation.goal_camera();
+    let (dots, look) = (window.app().view.look.dots, window.app().ui.panels.look);
+    let (inputs, statistics) = (window.app().ui.panels.inputs, window.app().ui.panels.statistics);
+    let orthographic = window.app().view.navigation.is_orthographic();
     match command {
         Command::InvertSelection | Command::HideSelected | Command::DeleteSelected | Command::CropToSelected => {
             // Half of the points, selected without waiting for a picture.
@@ -70,7 +70,7 @@ fn check(window: &mut Window, command: Command) {
     let selected = counts(window).selected;
     give(window, command);
     let after = counts(window);
-    let now = window.app().navigation.goal_camera();
+    let now = window.app().view.navigation.goal_camera();
     let app = window.app();
     match command {
         // Tests open no system dialog, so that the text field appears.
@@ -82,24 +82,24 @@ fn check(window: &mut Window, command: Command) {
             assert!(!window.says("Path of a file"), "it goes away");
         }
         Command::Export => {
-            assert!(app.panels.export.open && window.says("Export points"), "the dialog is open");
+            assert!(app.ui.panels.export.open && window.says("Export points"), "the dialog is open");
             window.press(Key::Escape);
-            assert!(!window.app().panels.export.open, "Escape closes it");
+            assert!(!window.app().ui.panels.export.open, "Escape closes it");
         }
         Command::Screenshot => {
-            assert!(app.panels.picture.open && window.says("Save picture"), "the dialog is open");
+            assert!(app.ui.panels.picture.open && window.says("Save picture"), "the dialog is open");
             window.press(Key::Escape);
-            assert!(!window.app().panels.picture.open, "Escape closes it");
+            assert!(!window.app().ui.panels.picture.open, "Escape closes it");
         }
         Command::Film => {
-            assert!(app.panels.film.open && window.says("Film"), "the window is open");
+            assert!(app.ui.panels.film.open && window.says("Film"), "the window is open");
             give(window, command);
-            assert!(!window.app().panels.film.open, "and goes");
+            assert!(!window.app().ui.panels.film.open, "and goes");
         }
         Command::SaveState => {
-            assert!(app.panels.session.open && window.says("Save session"), "the dialog is open");
+            assert!(app.ui.panels.session.open && window.says("Save session"), "the dialog is open");
             window.press(Key::Escape);
-            assert!(!window.app().panels.session.open, "Escape closes it");
+            assert!(!window.app().ui.panels.session.open, "Escape closes it");
         }
         Command::CloseAll => {
             assert!(app.document().layers.is_empty(), "nothing is open any more");
@@ -135,9 +135,9 @@ fn check(window: &mut Window, command: Command) {
         }
         Command::FitAll | Command::FitSelected => {
             let far = Camera { eye: view.eye + 100.0 * (view.eye - view.look_at), ..view };
-            window.harness.state_mut().navigation.go_to(&far, true);
+            window.harness.state_mut().view.navigation.go_to(&far, true);
             give(window, command);
-            let fitted = window.app().navigation.goal_camera();
+            let fitted = window.app().view.navigation.goal_camera();
             let distance = fitted.eye.distance(fitted.look_at);
             assert!(distance < 0.1 * far.eye.distance(far.look_at), "{command:?} comes near: {distance}");
         }
@@ -156,19 +156,19 @@ fn check(window: &mut Window, command: Command) {
             let other = if a.length() > 1e-2 * view.eye.distance(view.look_at) { a.dot(b) < 0.0 } else { now != view };
             assert!(other, "{view:?} to {now:?}");
         }
-        Command::Projection => assert_ne!(app.navigation.is_orthographic(), orthographic, "the other projection"),
+        Command::Projection => assert_ne!(app.view.navigation.is_orthographic(), orthographic, "the other projection"),
         Command::UpAxis => {
-            assert_eq!(app.up_axis, Some(Axes::ZUp), "first Z");
+            assert_eq!(app.session.up_axis, Some(Axes::ZUp), "first Z");
             for axes in [Some(Axes::YUp), Some(Axes::Camera), None] {
                 give(window, command);
-                assert_eq!(window.app().up_axis, axes, "then the next");
+                assert_eq!(window.app().session.up_axis, axes, "then the next");
             }
         }
         Command::Level => {
             let tilted = Camera { up: view.up + 0.5 * DVec3::X, ..Camera { eye: view.look_at + DVec3::Y, ..view } };
-            window.harness.state_mut().navigation.go_to(&tilted, true);
+            window.harness.state_mut().view.navigation.go_to(&tilted, true);
             give(window, command);
-            let camera = window.app().navigation.goal_camera();
+            let camera = window.app().view.navigation.goal_camera();
             let [right, ..] = camera.axes().expect("it sees");
             assert!(right.dot(window.app().up()).abs() < 1e-9, "the horizon is level: {right}");
         }
@@ -185,29 +185,29 @@ fn check(window: &mut Window, command: Command) {
             assert!(now.eye.distance(wanted) < 1e-6, "{} is not {wanted}", now.eye);
         }
         Command::Play => {
-            let playing = app.playing.clock.playing;
+            let playing = app.session.playing.clock.playing;
             give(window, command);
-            assert_ne!(window.app().playing.clock.playing, playing, "it goes on, or stops");
+            assert_ne!(window.app().session.playing.clock.playing, playing, "it goes on, or stops");
             give(window, command);
         }
         // Nothing plays here; tests of these commands are in `playing`.
         Command::StepBack | Command::StepForward | Command::PlayFromHere | Command::PlayToHere => {
-            assert_eq!(app.playing.clock.position(), 0.0, "there is no other time");
+            assert_eq!(app.session.playing.clock.position(), 0.0, "there is no other time");
         }
         Command::Dots => {
-            assert_ne!(app.look.dots, dots, "the other kind of picture");
+            assert_ne!(app.view.look.dots, dots, "the other kind of picture");
             window.settle();
             give(window, command);
         }
-        Command::Inputs => assert_ne!(app.panels.inputs, inputs, "the list comes or goes"),
-        Command::Look => assert_ne!(app.panels.look, look, "the panel comes or goes"),
-        Command::Statistics => assert_ne!(app.panels.statistics, statistics, "the window comes or goes"),
+        Command::Inputs => assert_ne!(app.ui.panels.inputs, inputs, "the list comes or goes"),
+        Command::Look => assert_ne!(app.ui.panels.look, look, "the panel comes or goes"),
+        Command::Statistics => assert_ne!(app.ui.panels.statistics, statistics, "the window comes or goes"),
         Command::Help => {
             assert!(window.says("Keys and mouse"), "the help is there");
             give(window, command);
-            assert!(!window.app().panels.help, "and goes");
+            assert!(!window.app().ui.panels.help, "and goes");
             window.event(Event::Text("?".into()));
-            assert!(window.app().panels.help, "and comes by the other key");
+            assert!(window.app().ui.panels.help, "and comes by the other key");
             give(window, command);
         }
         Command::Clip => {
@@ -221,7 +221,7 @@ fn check(window: &mut Window, command: Command) {
             window.press(Key::Escape);
             assert_eq!(focused(window), None, "Escape gives it back");
         }
-        Command::Tool(tool) => assert_eq!(app.tool, tool, "the tool is taken"),
+        Command::Tool(tool) => assert_eq!(app.ui.tool, tool, "the tool is taken"),
         #[allow(unreachable_patterns, reason = "a new command has no case before it is written")]
         other => panic!("{other:?}: say here what its key does"),
     }
@@ -264,7 +264,7 @@ fn f6_goes_round_the_window_and_tab_through_a_panel() {
         window.step();
         assert_eq!(place(&window), *wanted, "backwards");
     }
-    let dots = window.app().look.dots;
+    let dots = window.app().view.look.dots;
     (0..3).for_each(|_| window.press(Key::F6));
     assert!(place(&window).x > picture.right(), "the look panel");
     for _ in 0..4 {
@@ -280,9 +280,9 @@ fn f6_goes_round_the_window_and_tab_through_a_panel() {
     });
     window.press(Key::Escape);
     assert_eq!(focused(&window), None, "Escape gives the keyboard back to the picture");
-    assert!(selected(&window) > 0 && window.app().look.dots == dots, "and does nothing else");
+    assert!(selected(&window) > 0 && window.app().view.look.dots == dots, "and does nothing else");
     window.press(Key::Tab);
-    assert_ne!(window.app().look.dots, dots, "there Tab is for points and surface");
+    assert_ne!(window.app().view.look.dots, dots, "there Tab is for points and surface");
     window.press(Key::Escape);
     assert_eq!(selected(&window), 0, "and Escape for the selection");
 }
@@ -300,12 +300,12 @@ fn every_key_does_what_its_command_says() {
         // A camera that no view has.
         let mut camera = elsewhere(&window);
         camera.projection = autosplats::Projection::PerspectiveFovDeg(40.0);
-        window.harness.state_mut().navigation.go_to(&camera, true);
+        window.harness.state_mut().view.navigation.go_to(&camera, true);
         if command == Command::View(ViewDirection::Front) {
             // The expected directions are for Z upward.
-            window.harness.state_mut().up_axis = Some(Axes::ZUp);
+            window.harness.state_mut().session.up_axis = Some(Axes::ZUp);
         } else if command == Command::UpAxis {
-            window.harness.state_mut().up_axis = None;
+            window.harness.state_mut().session.up_axis = None;
         }
         if window.app().shown().is_none() {
             window.settle();
@@ -320,12 +320,12 @@ fn keys_that_are_typed_are_no_commands() {
     let mut window = Window::with_statue();
     window.key(CTRL, Key::E);
     window.steps(2);
-    let (dots, look) = (window.app().look.dots, window.app().panels.look);
+    let (dots, look) = (window.app().view.look.dots, window.app().ui.panels.look);
     window.press(Key::L);
     window.press(Key::Delete);
-    assert_eq!((window.app().look.dots, window.app().panels.look), (dots, look), "letters go into the text");
+    assert_eq!((window.app().view.look.dots, window.app().ui.panels.look), (dots, look), "letters go into the text");
     window.press(Key::Escape);
     window.steps(2);
     window.press(Key::L);
-    assert_ne!(window.app().panels.look, look, "without the text L opens a panel");
+    assert_ne!(window.app().ui.panels.look, look, "without the text L opens a panel");
 }

@@ -117,14 +117,14 @@ fn rest(window: &mut Window) -> f64 {
     // The window's requests to the system are kept by the test, not by the program.
     (window.commands, window.outputs) = (Vec::new(), Vec::new());
     let app = window.harness.state_mut();
-    app.loader.cancel_all();
-    app.history = crate::document::History::default();
-    app.version += 1;
+    app.session.loader.cancel_all();
+    app.session.history = crate::document::History::default();
+    app.session.version += 1;
     // A film preview may hold tens of thousands of cameras.
-    app.panels.film.stop();
+    app.ui.panels.film.stop();
     window.until("everything is closed", |window| {
         let app = window.app();
-        app.loader.jobs().is_empty() && app.document().layers.is_empty() && app.render.is_idle()
+        app.session.loader.jobs().is_empty() && app.document().layers.is_empty() && app.view.render.is_idle()
     });
     // Pending results are received, and writing threads release their data.
     for _ in 0..10 {
@@ -147,7 +147,7 @@ fn soak(seconds: f64, seed: u64, allowed_mb: f64) {
     while start.elapsed().as_secs_f64() < seconds {
         anything(&mut window, &mut chance);
         // Another backend has buffers of its own, so that samples could not be compared.
-        window.harness.state_mut().look.backend = Backend::Cpu;
+        window.harness.state_mut().view.look.backend = Backend::Cpu;
         events += 1;
         if start.elapsed().as_secs_f64() >= next {
             samples.push(rest(&mut window));
@@ -161,7 +161,7 @@ fn soak(seconds: f64, seed: u64, allowed_mb: f64) {
     println!("{seen}");
     assert!(grown < allowed_mb, "memory grows: {seen}");
     assert!(events as f64 > 0.5 * seconds, "the window still answers: {seen}");
-    window.until("it can still be used", |window| !window.app().navigation.is_moving());
+    window.until("it can still be used", |window| !window.app().view.navigation.is_moving());
 }
 
 /// The minima of `parts` equal parts.

@@ -23,9 +23,9 @@ fn app(context: &egui::Context, tool: Tool) -> App {
         projection: autosplats::Projection::PerspectiveFovDeg(40.0),
     };
     app.set_camera(&camera);
-    app.tool = tool;
+    app.ui.tool = tool;
     // Selecting visible points only would need a picture.
-    app.tools.through = true;
+    app.ui.tools.through = true;
     frame(&mut app, context, Event::PointerMoved(pos2(100.0, 100.0)));
     app
 }
@@ -36,7 +36,7 @@ fn frame(app: &mut App, context: &egui::Context, event: Event) {
     let input = egui::RawInput { screen_rect: Some(rect), events: vec![event], ..egui::RawInput::default() };
     let mut output = context.run_ui(input, |ui| {
         if escape {
-            app.tools.cancel_drag();
+            app.ui.tools.cancel_drag();
         }
         let response = ui.allocate_rect(rect, egui::Sense::click_and_drag());
         drag(app, &response, [200, 200]);
@@ -53,11 +53,11 @@ fn button(pressed: bool, place: Pos2) -> Event {
 fn hits(app: &App) -> Option<usize> {
     // Tasks run in order: when this one is answered, so are all before it.
     let (wish, region) = (Box::new(app.wish([200, 200], false)), Region::brush(&[], 1.0));
-    app.render.task(Task::Select { wish, region, through: true, mode: SelectMode::Intersect });
+    app.view.render.task(Task::Select { wish, region, through: true, mode: SelectMode::Intersect });
     let mut hits = None;
     let end = Instant::now() + Duration::from_secs(60);
     while Instant::now() < end {
-        for answer in app.render.answers() {
+        for answer in app.view.render.answers() {
             match answer {
                 Answer::Done(Outcome::Selected { mode: SelectMode::Intersect, .. }) => return hits,
                 Answer::Done(Outcome::Selected { hits: found, .. }) => {
@@ -80,7 +80,7 @@ fn a_click_of_the_brush_selects_what_is_under_it() {
         frame(&mut app, &context, button(true, pos2(100.0, 100.0)));
         frame(&mut app, &context, button(false, pos2(100.0, 100.0)));
         assert_eq!(hits(&app), wanted, "{tool:?}");
-        assert!(app.tools.way.is_empty(), "nothing is drawn any more");
+        assert!(app.ui.tools.way.is_empty(), "nothing is drawn any more");
     }
 }
 
@@ -111,14 +111,14 @@ fn a_drag_that_is_given_up_selects_nothing() {
 fn pictures_of_dots_have_dots_as_large_as_the_screen() {
     let context = egui::Context::default();
     let mut app = app(&context, Tool::Navigate);
-    (app.look.dots, app.look.dot_size) = (true, 4);
-    app.look.backend = autosplats::Backend::Cpu;
+    (app.view.look.dots, app.view.look.dot_size) = (true, 4);
+    app.view.look.backend = autosplats::Backend::Cpu;
     let (wish, goal) = (Box::new(app.wish([40, 40], false)), Goal::Film(0));
-    app.render.task(Task::Photograph { wish, goal });
+    app.view.render.task(Task::Photograph { wish, goal });
     let end = Instant::now() + Duration::from_secs(60);
     let image = loop {
         assert!(Instant::now() < end, "the thread does not answer");
-        match app.render.answers().find(|answer| !matches!(answer, Answer::Device(_))) {
+        match app.view.render.answers().find(|answer| !matches!(answer, Answer::Device(_))) {
             Some(Answer::Done(Outcome::Photographed { image, .. })) => break image,
             Some(Answer::Failed(why)) => panic!("{why}"),
             _ => std::thread::sleep(Duration::from_millis(1)),
@@ -141,17 +141,17 @@ fn a_double_click_measures_one_corner() {
         app.picked(Purpose::Measure, Some(seen));
     }
     let [one, other] = [DVec3::ZERO, DVec3::new(0.5, 0.0, 0.0)];
-    assert_eq!(app.tools.measured, [one, other, one], "none twice in a row");
+    assert_eq!(app.ui.tools.measured, [one, other, one], "none twice in a row");
 }
 
 #[test]
 fn all_dots_can_be_selected() {
     let context = egui::Context::default();
     let mut app = app(&context, Tool::Lasso);
-    let reconstruction = app.look.settings.reconstruction.clone();
+    let reconstruction = app.view.look.settings.reconstruction.clone();
     assert!(reconstruction.outlier_expansions.is_some(), "outliers are left out of surfaces");
     assert_eq!(app.wish([9, 9], false).of_points().settings.reconstruction, reconstruction, "and stay so");
-    app.look.dots = true;
+    app.view.look.dots = true;
     let wish = app.wish([9, 9], false).of_points();
     assert_eq!(wish.dots, None, "found by a surface");
     assert_eq!(wish.settings.reconstruction.outlier_expansions, None, "that has all points");

@@ -9,14 +9,14 @@ fn remove(app: &mut App, context: &egui::Context) {
         document.remove(id);
     });
     app.follow_streams(context);
-    assert!(app.playing.is_empty(), "it is not read any more");
+    assert!(app.session.playing.is_empty(), "it is not read any more");
 }
 
 /// An application stopped at the fourth of five frames, so that its points can be edited.
 fn at_the_fourth(folder: &Path, context: &egui::Context) -> App {
     let mut app = app(&sequence(folder, 5), context);
     app.toggle_playing();
-    app.playing.clock.seek(0.35);
+    app.session.playing.clock.seek(0.35);
     until(&mut app, context, "the fourth frame", |app| left(app) == Some(30.0));
     until(&mut app, context, "a pause", |app| !app.document().layers[0].incomplete);
     app
@@ -29,14 +29,18 @@ fn undo_brings_a_layer_back_with_its_stream() {
     let mut app = at_the_fourth(folder.path(), &context);
     remove(&mut app, &context);
     app.undo();
-    until(&mut app, &context, "its timeline", |app| app.playing.has_timeline());
-    assert_eq!((app.playing.frame(), left(&app)), (Some((3, 5)), Some(30.0)), "at the time at which it was removed");
-    app.playing.step(true);
+    until(&mut app, &context, "its timeline", |app| app.session.playing.has_timeline());
+    assert_eq!(
+        (app.session.playing.frame(), left(&app)),
+        (Some((3, 5)), Some(30.0)),
+        "at the time at which it was removed"
+    );
+    app.session.playing.step(true);
     until(&mut app, &context, "the fifth frame", |app| left(app) == Some(40.0));
     remove(&mut app, &context);
-    app.history = crate::document::History::default();
+    app.session.history = crate::document::History::default();
     app.follow_streams(&context);
-    assert!(app.playing.removed.is_empty(), "what undo cannot bring back is forgotten");
+    assert!(app.session.playing.removed.is_empty(), "what undo cannot bring back is forgotten");
 }
 
 #[test]
@@ -47,15 +51,19 @@ fn undo_brings_edits_back_with_their_time() {
     delete(&mut app);
     remove(&mut app, &context);
     // The clock moves on meanwhile.
-    app.playing.clock.seek(0.1);
+    app.session.playing.clock.seek(0.1);
     app.undo();
-    until(&mut app, &context, "its timeline", |app| app.playing.has_timeline());
+    until(&mut app, &context, "its timeline", |app| app.session.playing.has_timeline());
     (0..20).for_each(|_| {
         app.follow_streams(&context);
         std::thread::sleep(Duration::from_millis(2));
     });
     assert_eq!(app.document().counts().deleted, 7, "they are still there");
-    assert_eq!((app.playing.frame(), left(&app)), (Some((3, 5)), Some(30.0)), "on the points that they were made on");
+    assert_eq!(
+        (app.session.playing.frame(), left(&app)),
+        (Some((3, 5)), Some(30.0)),
+        "on the points that they were made on"
+    );
 }
 
 #[test]
@@ -64,15 +72,15 @@ fn what_is_played_is_read_again_where_it_stands() {
     let context = egui::Context::default();
     let mut app = at_the_fourth(folder.path(), &context);
     let id = app.document().layers[0].id;
-    app.playing.clock.begin_here();
+    app.session.playing.clock.begin_here();
     std::fs::write(folder.path().join("frame_3.xyz"), "77 0 0\n78 0 0\n77 1 0\n").expect("another frame");
     app.reload_layer(id);
-    assert_eq!(app.playing.clock.position(), 0.35, "while it is opened");
+    assert_eq!(app.session.playing.clock.position(), 0.35, "while it is opened");
     until(&mut app, &context, "the new frame", |app| left(app) == Some(77.0));
-    assert_eq!((app.playing.frame(), app.document().layers.len()), (Some((3, 5)), 1), "in the same place");
-    assert_eq!(app.playing.clock.span()[0], 0.35, "and so is the part that is played");
+    assert_eq!((app.session.playing.frame(), app.document().layers.len()), (Some((3, 5)), 1), "in the same place");
+    assert_eq!(app.session.playing.clock.span()[0], 0.35, "and so is the part that is played");
     delete(&mut app);
-    assert!(app.history.is_unsaved(id), "the comparison can tell");
+    assert!(app.session.history.is_unsaved(id), "the comparison can tell");
     std::fs::write(folder.path().join("frame_3.xyz"), "99 0 0\n98 0 0\n99 1 0\n").expect("another frame");
     app.reload_layer(id);
     (0..20).for_each(|_| {
@@ -95,11 +103,15 @@ fn what_has_ended_can_be_played_again() {
         std::fs::rename(folder.path().join(&name), away.join(&name)).expect("moved away");
     }
     app.reload_layer(id);
-    until(&mut app, &context, "the failure", |app| app.playing.is_empty());
-    assert_eq!((left(&app), app.failed.len()), (Some(30.0), 0), "what was there stays, and is in a session once");
+    until(&mut app, &context, "the failure", |app| app.session.playing.is_empty());
+    assert_eq!(
+        (left(&app), app.session.failed.len()),
+        (Some(30.0), 0),
+        "what was there stays, and is in a session once"
+    );
     sequence(folder.path(), 5);
     app.reload_layer(id);
-    until(&mut app, &context, "its timeline", |app| app.playing.has_timeline());
-    app.playing.step(true);
+    until(&mut app, &context, "its timeline", |app| app.session.playing.has_timeline());
+    app.session.playing.step(true);
     until(&mut app, &context, "the fifth frame", |app| left(app) == Some(40.0));
 }

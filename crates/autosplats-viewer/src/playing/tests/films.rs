@@ -14,7 +14,7 @@ fn film(app: &mut App, context: &egui::Context, places: &[f64], folder: &Path) -
     let target = Target::new(&folder.join("f.png")).expect("pictures");
     let wish = app.wish([48, 32], false);
     let cameras = vec![wish.camera; places.len()];
-    let reel = Reel::start(app.playing.tracks(places), app.messages.sender(), context.clone());
+    let reel = Reel::start(app.session.playing.tracks(places), app.ui.messages.sender(), context.clone());
     let mut recording = Recording::start(wish, cameras, Some(reel), 25, target, context);
     let mut pictures = Vec::new();
     let begun = Instant::now();
@@ -22,9 +22,9 @@ fn film(app: &mut App, context: &egui::Context, places: &[f64], folder: &Path) -
         assert!(begun.elapsed() < Duration::from_secs(60), "the film does not end");
         if let Some(wish) = recording.wanted()? {
             let goal = crate::output::Goal::Film(recording.number);
-            app.render.task(crate::render::Task::Photograph { wish: Box::new(wish), goal });
+            app.view.render.task(crate::render::Task::Photograph { wish: Box::new(wish), goal });
         }
-        for answer in app.render.answers().collect::<Vec<_>>() {
+        for answer in app.view.render.answers().collect::<Vec<_>>() {
             match answer {
                 Answer::Done(Outcome::Photographed { image, range, .. }) => {
                     pictures.push(Image::clone(&image));
@@ -53,7 +53,7 @@ fn each_picture_shows_the_frame_of_its_time() {
     let eye = at + autosplats::cloud::glam::DVec3::new(0.0, -60.0, 20.0);
     let up = autosplats::cloud::glam::DVec3::Z;
     let camera = Camera { eye, look_at: at, up, projection: Projection::PerspectiveFovDeg(60.0) };
-    app.navigation.go_to(&camera, true);
+    app.view.navigation.go_to(&camera, true);
     let places = [0.0, 0.1, 0.15, 0.3, 0.45, 0.2, 0.0];
     let pictures = film(&mut app, &context, &places, out.path()).expect("a film");
     assert_eq!(pictures.len(), places.len(), "one each");
@@ -62,13 +62,13 @@ fn each_picture_shows_the_frame_of_its_time() {
     let options = ReadOptions { exact: true, ..source.options.clone() };
     let mut player = source.source.play(&source.play, &options, &()).expect("it plays");
     let mut renderer = Renderer::with_backend(Backend::Cpu).expect("a processor");
-    let mut settings = app.look.settings.clone();
+    let mut settings = app.view.look.settings.clone();
     let axes = app.axes();
     for (number, (picture, frame)) in pictures.iter().zip([0, 1, 1, 3, 4, 2, 0]).enumerate() {
         let cloud = player.frame(frame, &()).expect("a frame");
         let cloud = autosplats::cloud::PointCloud::clone(&cloud).with_axes(axes);
         settings.reconstruction.k = settings.reconstruction.k.min(39);
-        let rendered = renderer.render(&cloud, &app.navigation.camera(), [48, 32], &settings).expect("a picture");
+        let rendered = renderer.render(&cloud, &app.view.navigation.camera(), [48, 32], &settings).expect("a picture");
         if let Some(range) = rendered.counts.value_range {
             settings.shading.range.get_or_insert(range.map(|end| end as f32));
         }

@@ -71,16 +71,20 @@ fn a_folder_is_played_by_the_clock() {
     let folder = tempfile::tempdir().expect("a folder");
     let context = egui::Context::default();
     let mut app = app(&sequence(folder.path(), 5), &context);
-    assert!((app.playing.clock.length() - 0.5).abs() < 1e-9, "ten a second: {}", app.playing.clock.length());
-    assert_eq!(app.playing.frame(), Some((0, 5)));
-    app.playing.clock.seek(0.35);
+    assert!(
+        (app.session.playing.clock.length() - 0.5).abs() < 1e-9,
+        "ten a second: {}",
+        app.session.playing.clock.length()
+    );
+    assert_eq!(app.session.playing.frame(), Some((0, 5)));
+    app.session.playing.clock.seek(0.35);
     until(&mut app, &context, "the fourth frame", |app| left(app) == Some(30.0));
-    app.playing.step(true);
+    app.session.playing.step(true);
     until(&mut app, &context, "the fifth frame", |app| left(app) == Some(40.0));
-    assert!(!app.playing.clock.playing, "whoever steps wants to look");
-    app.playing.step(true);
-    assert_eq!(app.playing.frame(), Some((4, 5)), "there is none behind the last");
-    app.playing.step(false);
+    assert!(!app.session.playing.clock.playing, "whoever steps wants to look");
+    app.session.playing.step(true);
+    assert_eq!(app.session.playing.frame(), Some((4, 5)), "there is none behind the last");
+    app.session.playing.step(false);
     until(&mut app, &context, "the fourth frame again", |app| left(app) == Some(30.0));
 }
 
@@ -96,11 +100,11 @@ fn edits_are_not_played_over() {
     delete(&mut app);
     app.toggle_playing();
     app.follow_streams(&context);
-    assert!(!app.playing.clock.playing, "it waits");
+    assert!(!app.session.playing.clock.playing, "it waits");
     app.undo();
     app.toggle_playing();
     app.follow_streams(&context);
-    assert!(app.playing.clock.playing, "nothing would be lost any more");
+    assert!(app.session.playing.clock.playing, "nothing would be lost any more");
 }
 
 /// Deletes seven points.
@@ -118,7 +122,7 @@ fn what_is_removed_is_not_played_on() {
     let context = egui::Context::default();
     let mut app = app(&sequence(folder.path(), 5), &context);
     app.give_up(app.document().layers[0].id);
-    assert!(app.playing.is_empty() && app.document().layers.is_empty(), "nothing is left of it");
+    assert!(app.session.playing.is_empty() && app.document().layers.is_empty(), "nothing is left of it");
 }
 
 #[test]
@@ -128,8 +132,8 @@ fn what_cannot_be_played_is_told() {
     let input = Input::parse(&folder.path().display().to_string()).expect("a folder");
     let options = Options { inputs: vec![input], backend: Some(Backend::Cpu), ..Options::default() };
     let mut app = App::new(options, Look::default(), Vec::new(), &context);
-    until(&mut app, &context, "the failure", |app| app.playing.is_empty());
-    assert_eq!(app.failed.len(), 1, "a session keeps its name");
+    until(&mut app, &context, "the failure", |app| app.session.playing.is_empty());
+    assert_eq!(app.session.failed.len(), 1, "a session keeps its name");
     assert!(app.document().layers.is_empty(), "and nothing is shown");
 }
 
@@ -141,7 +145,7 @@ fn what_waits_for_its_first_points_says_so() {
     input.play.watch = true;
     let options = Options { inputs: vec![input.clone()], backend: Some(Backend::Cpu), ..Options::default() };
     let mut app = App::new(options, Look::default(), Vec::new(), &context);
-    let why = |app: &App| app.playing.waiting().next().map(|waiting| waiting.why);
+    let why = |app: &App| app.session.playing.waiting().next().map(|waiting| waiting.why);
     until(&mut app, &context, "a word", |app| why(app).is_some_and(|why| why.contains("points")));
     // A stream that is paused before its first points still shows them.
     app.toggle_playing();
@@ -153,5 +157,5 @@ fn what_waits_for_its_first_points_says_so() {
     let context = egui::Context::default();
     crate::keys::run(&mut app, &context, crate::commands::Command::CloseAll);
     app.follow_streams(&context);
-    assert!(app.playing.is_empty() && app.failed.is_empty(), "closed as all is");
+    assert!(app.session.playing.is_empty() && app.session.failed.is_empty(), "closed as all is");
 }

@@ -26,7 +26,7 @@ fn a_session_plays_the_same() {
     input.play.latest.accumulate = true;
     let mut first = app_of(input, &context);
     first.toggle_playing();
-    let clock = &mut first.playing.clock;
+    let clock = &mut first.session.playing.clock;
     clock.seek(0.5);
     clock.begin_here();
     clock.seek(2.0);
@@ -44,15 +44,15 @@ fn a_session_plays_the_same() {
     kept.write(&path).expect("written");
 
     let mut second = again(&path, &context);
-    let clock = |app: &App| serde_json::to_string(&app.playing.clock).expect("a clock");
+    let clock = |app: &App| serde_json::to_string(&app.session.playing.clock).expect("a clock");
     assert_eq!(inputs(&second), inputs(&first), "all of it, even before anything is open");
     assert_eq!(clock(&second), clock(&first), "and when");
     until(&mut second, &context, "the fourth frame", |app| app.document().counts().points == 160);
     assert_eq!(clock(&second), clock(&first), "nor does time pass until then");
-    assert_eq!(second.playing.clock.length(), 2.5, "at its own rate");
-    assert_eq!(second.playing.frame(), Some((3, 5)));
+    assert_eq!(second.session.playing.clock.length(), 2.5, "at its own rate");
+    assert_eq!(second.session.playing.frame(), Some((3, 5)));
     assert_eq!(second.document().layers[0].tint, Some([1, 2, 3]), "in its colour");
-    second.playing.step(true);
+    second.session.playing.step(true);
     until(&mut second, &context, "the fifth frame", |app| app.document().counts().points == 200);
 }
 
@@ -70,9 +70,9 @@ fn what_waits_or_failed_is_kept_as_it_is_to_look() {
     let path = folder.path().join("state.json");
     waiting.write(&path).expect("written");
     // The folder holds nothing that can be played.
-    until(&mut first, &context, "the failure", |app| app.playing.is_empty());
+    until(&mut first, &context, "the failure", |app| app.session.playing.is_empty());
     assert_eq!(State::of(&first), waiting, "what failed is no less a part of it");
     let second = again(&path, &context);
-    assert_eq!(second.playing.waiting().next().map(|waiting| waiting.appearance), Some(appearance));
+    assert_eq!(second.session.playing.waiting().next().map(|waiting| waiting.appearance), Some(appearance));
     assert_eq!(inputs(&second), inputs(&first), "nor is what still waits");
 }
