@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use autosplats::cloud::PointCloud;
 
-use crate::app::App;
-use crate::document::{Counts, Document, LayerId, label};
+use crate::document::{ClipBox, Counts, Document, LayerId, label};
+use crate::session::Session;
 
 /// Counts that panels show, for one version of the document.
 #[derive(Default)]
@@ -22,37 +22,36 @@ pub(crate) struct CachedCounts {
     pub(crate) old_bytes: usize,
 }
 
-impl App {
+impl Session {
     pub(crate) fn document(&self) -> &Document {
-        self.session.history.current()
+        self.history.current()
     }
 
-    /// Version of the document; every change increases it.
-    pub(crate) fn version(&self) -> u64 {
-        self.session.version
-    }
-
-    /// Point counts of the document and of each layer. They are computed only after a change, and not during a drag.
-    pub(crate) fn counts(&mut self) -> &CachedCounts {
-        if self.session.counted.version != self.session.version && !self.ui.tools.gizmo.is_busy() {
+    /// Counts the points again, if the document has changed and no change to it is unfinished.
+    pub(crate) fn count(&mut self) {
+        if self.counted.version != self.version && self.clip_before.is_none() {
             let document = self.document();
-            self.session.counted = CachedCounts {
-                version: self.session.version,
+            self.counted = CachedCounts {
+                version: self.version,
                 all: document.counts(),
                 layers: document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect(),
                 bytes: document.layers.iter().map(|layer| layer.cloud.byte_len()).sum(),
-                old_bytes: self.session.history.old_bytes(),
+                old_bytes: self.history.old_bytes(),
             };
         }
-        &self.session.counted
+    }
+
+    /// Point counts of the document and of each layer, as of the last [`count`](Self::count).
+    pub(crate) fn counts(&self) -> &CachedCounts {
+        &self.counted
     }
 
     /// Changes the document as an undo step.
     pub(crate) fn edit(&mut self, label: impl Into<String>, edit: impl FnOnce(&mut Document)) {
         let mut document = self.document().clone();
         edit(&mut document);
-        self.session.history.record(label, document);
-        self.session.version += 1;
+        self.history.record(label, document);
+        self.version += 1;
     }
 
     /// Changes points as an undo step. `edit` returns the number of points that it changed; with 0 there is no step.
@@ -60,8 +59,8 @@ impl App {
         let mut document = self.document().clone();
         let points = edit(&mut document);
         if points > 0 {
-            self.session.history.record(label(verb, points), document);
-            self.session.version += 1;
+            self.history.record(label(verb, points), document);
+            self.version += 1;
         }
     }
 
@@ -69,33 +68,70 @@ impl App {
     pub(crate) fn change<T>(&mut self, change: impl FnOnce(&mut Document) -> T) -> T {
         let mut document = self.document().clone();
         let result = change(&mut document);
-        self.session.history.replace(document);
-        self.session.version += 1;
+        self.history.replace(document);
+        self.version += 1;
         result
     }
 
     /// Changes the document and its whole history, for changes that undo must keep: files that come and go, and
     /// visibility.
     pub(crate) fn settle(&mut self, change: impl Fn(&mut Document)) {
-        self.session.history.everywhere(change);
-        self.session.version += 1;
+        self.history.everywhere(change);
+        self.version += 1;
     }
 
     /// Replaces the points of a layer.
     pub(crate) fn fill(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
-        self.session.history.reload(id, cloud);
-        self.session.version += 1;
+        self.history.reload(id, cloud);
+        self.version += 1;
     }
 
     /// Undoes the last edit and returns its label.
     pub(crate) fn undo(&mut self) -> Option<String> {
-        self.session.version += 1;
-        self.session.history.undo()
+        self.version += 1;
+        self.history.undo()
     }
 
     /// Redoes the edit that was undone last and returns its label.
     pub(crate) fn redo(&mut self) -> Option<String> {
-        self.session.version += 1;
-        self.session.history.redo()
+        self.version += 1;
+        self.history.redo()
+    }
+
+    /// Sets the clipping box, until [`settle_clip`](Self::settle_clip) makes an undo step of it.
+    pub(crate) fn preview_clip(&mut self, clip: Option<ClipBox>) {
+        let before = self.document().clip;
+        if clip != before {
+            self.clip_before.get_or_insert(before);
+            self.change(|document| document.clip = clip);
+        }
+    }
+
+    /// Whether a change to the clipping box is no undo step yet.
+    pub(crate) fn is_clip_unsettled(&self) -> bool {
+        self.clip_before.is_some()
+    }
+
+    /// Combines all changes to the clipping box since the last call into one undo step.
+    pub(crate) fn settle_clip(&mut self) {
+        let Some(before) = self.clip_before.take() else { return };
+        let clip = self.document().clip;
+        if clip == before {
+            return;
+        }
+        self.change(|document| document.clip = before);
+        self.edit("Clipping box", |document| document.clip = clip);
+    }
+
+    /// Switches the clipping box on or off. Without one, a box around everything is created. Returns whether the box
+    /// is on; `None` if there are no points to clip.
+    pub(crate) fn switch_clip(&mut self) -> Option<bool> {
+        let clip = match self.document().clip {
+            Some(clip) => ClipBox { enabled: !clip.enabled, ..clip },
+            None => self.document().whole_bounds().map(|[min, max]| ClipBox::new(min, max))?,
+        };
+        self.preview_clip(Some(clip));
+        self.settle_clip();
+        Some(clip.enabled)
     }
 }

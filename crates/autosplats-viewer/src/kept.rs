@@ -9,7 +9,6 @@ use autosplats_formats::{DepthCamera, ReadOptions};
 use autosplats_sources::{LatestOptions, PlayOptions, Source};
 use serde::{Deserialize, Serialize};
 
-use crate::app::App;
 use crate::loading::{Appearance, Input};
 
 /// An input as stored in a file.
@@ -75,7 +74,7 @@ impl StoredInput {
     /// Stores an input and its appearance.
     pub(crate) fn of(input: &Input, appearance: Appearance) -> Self {
         let Appearance { visible, tint } = appearance;
-        let (source, pose) = (App::source_name(input), input.world_from_input);
+        let (source, pose) = (input.source_name(), input.world_from_input);
         Self {
             source,
             visible,

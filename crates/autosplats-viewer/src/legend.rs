@@ -3,9 +3,9 @@
 use autosplats::{ColorMap, ColorMode};
 use eframe::egui::{self, Color32, Mesh, Rect, pos2, vec2};
 
-use crate::app::App;
 use crate::overlay::round;
-use crate::tools::ruler;
+use crate::session::Session;
+use crate::view::View;
 
 /// Width of the colour bar, screen points.
 const BAR_WIDTH: f32 = 14.0;
@@ -17,9 +17,10 @@ const MARGIN: f32 = 8.0;
 const BAR_SEGMENTS: u16 = 64;
 
 /// Draws the legend at the right edge, if the last picture shows values.
-pub(crate) fn show(app: &App, ui: &egui::Ui, rect: Rect) {
-    let shading = &app.view.look.settings.shading;
-    let Some([low, high]) = app.view.shot.as_ref().and_then(|shot| shot.counts.value_range) else { return };
+pub(crate) fn show(session: &Session, view: &View, ui: &egui::Ui) {
+    let rect = view.rect;
+    let shading = &view.look.settings.shading;
+    let Some([low, high]) = view.shot.as_ref().and_then(|shot| shot.counts.value_range) else { return };
     let (true, Some(usual)) = (shading.legend, shading.color.usual_map()) else { return };
     let height = (0.5 * rect.height()).min(320.0);
     if height < 3.0 * MIN_LABEL_STEP {
@@ -28,7 +29,7 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: Rect) {
     let painter = ui.painter_at(rect);
     let font = egui::FontId::proportional(12.0);
     let text = |text: String| painter.layout_no_wrap(text, font.clone(), Color32::WHITE);
-    let title = text(title(&shading.color, app));
+    let title = text(title(&shading.color, session));
     let line = title.size().y;
     let bar_height = height - 3.0 * MARGIN - line;
     let values = ticks(low, high, f64::from(bar_height / MIN_LABEL_STEP).max(2.0));
@@ -55,9 +56,9 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: Rect) {
 }
 
 /// Name of the shown value, and its unit.
-fn title(color: &ColorMode, app: &App) -> String {
+fn title(color: &ColorMode, session: &Session) -> String {
     let unit = match color {
-        ColorMode::Height | ColorMode::Depth | ColorMode::Radius | ColorMode::KRadius => ruler(app).unit(),
+        ColorMode::Height | ColorMode::Depth | ColorMode::Radius | ColorMode::KRadius => session.ruler().unit(),
         _ => None,
     };
     unit.map_or_else(|| color.title(), |unit| format!("{} ({unit})", color.title()))

@@ -3,6 +3,7 @@
 //! [`run`] opens the window. The window never waits: threads of their own read files (`loading`) and render pictures
 //! (`render`), and send their results. `app` holds the work of each window frame.
 
+mod action;
 mod animation;
 mod app;
 mod commands;
@@ -20,10 +21,10 @@ mod measure;
 mod messages;
 mod navigation;
 mod opening;
-mod output;
 mod overlay;
 mod panels;
 mod playing;
+mod pointer;
 mod rate;
 mod recording;
 mod render;
@@ -38,7 +39,6 @@ mod tools;
 mod turns;
 mod ui;
 mod view;
-mod viewport;
 
 use std::path::PathBuf;
 
@@ -95,7 +95,7 @@ pub fn run(options: Options) -> Result<(), Error> {
         app.view.turns = turns::are_taken(creation).then(Default::default);
         if let Some(state) = state {
             let folder = app.session.file.as_deref().map(state::folder).unwrap_or_default();
-            state.restore(&mut app, &folder);
+            state.restore(&mut app.session, &mut app.view, &folder);
         }
         Ok(Box::new(app))
     });

@@ -1,6 +1,6 @@
 //! Reads inputs on threads of their own: points are shown as they arrive, and changed files are read again.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -63,6 +63,17 @@ impl Input {
     fn usual(name: String, source: Source) -> Self {
         let (options, play) = (ReadOptions::default(), PlayOptions::default());
         Self { name, source, options, play, played: false, world_from_input: DMat4::IDENTITY }
+    }
+
+    /// Name of the source, as a user could type it.
+    pub(crate) fn source_name(&self) -> String {
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string();
+        match &self.source {
+            Source::File(path) | Source::Recording(path) => absolute(path),
+            Source::Sequence(name) => absolute(Path::new(name)),
+            Source::Remote(address) => address.clone(),
+            Source::Scene(..) | Source::StandardInput => self.name.clone(),
+        }
     }
 
     /// Whether the points change over time.

@@ -12,23 +12,39 @@ const MAX_MESSAGES: usize = 6;
 /// The messages that are shown.
 pub(crate) struct Messages {
     list: Vec<Message>,
-    /// Messages from threads.
-    post: (MessageSender, Receiver<Result<String, String>>),
-    /// Why the last picture could not be rendered.
-    failure: Option<String>,
+    sender: MessageSender,
+    receiver: Receiver<Message>,
 }
 
-/// Sends messages from a thread: a note, or an error.
+/// Sends messages, from any thread.
 #[derive(Clone)]
 pub(crate) struct MessageSender {
-    sender: Sender<Result<String, String>>,
+    sender: Sender<Message>,
     context: egui::Context,
 }
 
 impl MessageSender {
-    /// Sends the result of some work.
-    pub(crate) fn send(&self, message: Result<String, String>) {
-        let _ = self.sender.send(message);
+    /// Sends a note, which disappears by itself.
+    pub(crate) fn note(&self, text: impl Into<String>) {
+        self.send(text.into(), false);
+    }
+
+    /// Sends an error, which stays until the user closes it.
+    pub(crate) fn error(&self, text: impl Into<String>) {
+        self.send(text.into(), true);
+    }
+
+    /// Sends the result of some work: a note, or an error.
+    pub(crate) fn result(&self, result: Result<String, String>) {
+        match result {
+            Ok(note) => self.note(note),
+            Err(error) => self.error(error),
+        }
+    }
+
+    fn send(&self, text: String, error: bool) {
+        // The receiver is gone once the window is closed.
+        let _ = self.sender.send(Message { text, error, since: None });
         self.context.request_repaint();
     }
 }
@@ -41,61 +57,39 @@ struct Message {
 }
 
 impl Messages {
-    /// No messages. `context` is asked for a repaint when a thread sends one.
+    /// No messages. `context` is asked for a repaint with each one.
     pub(crate) fn new(context: egui::Context) -> Self {
         let (sender, receiver) = channel();
-        Self { list: Vec::new(), post: (MessageSender { sender, context }, receiver), failure: None }
+        Self { list: Vec::new(), sender: MessageSender { sender, context }, receiver }
     }
 
-    /// A sender for a thread.
+    /// A sender of messages.
     pub(crate) fn sender(&self) -> MessageSender {
-        self.post.0.clone()
+        self.sender.clone()
     }
 
-    pub(crate) fn note(&mut self, text: impl Into<String>) {
-        self.push(text.into(), false);
-    }
-
-    pub(crate) fn error(&mut self, text: impl Into<String>) {
-        self.push(text.into(), true);
-    }
-
-    fn push(&mut self, text: String, error: bool) {
-        self.list.retain(|message| message.text != text);
-        self.list.push(Message { text, error, since: None });
-        let surplus = self.list.len().saturating_sub(MAX_MESSAGES);
-        self.list.drain(..surplus);
-    }
-
-    /// Shows why there is no picture, until there is one.
-    pub(crate) fn failure(&mut self, text: String) {
-        self.failure = Some(text);
-    }
-
-    /// Removes the failure, as there is a picture again.
-    pub(crate) fn forget_failure(&mut self) {
-        self.failure = None;
-    }
-
-    /// Draws the messages in the lower left corner of `rect`.
-    pub(crate) fn show(&mut self, context: &egui::Context, rect: egui::Rect) {
-        let posted: Vec<_> = self.post.1.try_iter().collect();
-        for message in posted {
-            match message {
-                Ok(note) => self.note(note),
-                Err(error) => self.error(error),
-            }
+    fn receive(&mut self) {
+        for message in self.receiver.try_iter() {
+            self.list.retain(|known| known.text != message.text);
+            self.list.push(message);
+            let surplus = self.list.len().saturating_sub(MAX_MESSAGES);
+            self.list.drain(..surplus);
         }
+    }
+
+    /// Draws the messages in the lower left corner of `rect`, and above them why there is no picture.
+    pub(crate) fn show(&mut self, context: &egui::Context, rect: egui::Rect, failure: Option<&str>) {
+        self.receive();
         let now = context.input(|input| input.time);
         self.list.retain(|message| message.error || message.since.is_none_or(|since| now - since < NOTE_S));
-        if self.list.is_empty() && self.failure.is_none() {
+        if self.list.is_empty() && failure.is_none() {
             return;
         }
         let corner = rect.left_bottom() + egui::vec2(10.0, -44.0);
         let area = egui::Area::new(egui::Id::unique("messages")).fixed_pos(corner).pivot(egui::Align2::LEFT_BOTTOM);
         area.order(egui::Order::Foreground).show(context, |ui| {
             ui.set_max_width((rect.width() - 20.0).clamp(100.0, 520.0));
-            if let Some(failure) = &self.failure {
+            if let Some(failure) = failure {
                 egui::Frame::popup(ui.style()).show(ui, |ui| {
                     ui.colored_label(ui.visuals().error_fg_color, failure);
                 });

@@ -2,8 +2,8 @@
 
 use eframe::egui::{self, Color32, Stroke};
 
-use crate::app::App;
-use crate::tools::ruler;
+use crate::session::Session;
+use crate::view::View;
 
 /// Red, green and blue of the axes, with brightnesses that differ for colour-blind users.
 const AXES: [(&str, Color32); 3] = [
@@ -13,18 +13,19 @@ const AXES: [(&str, Color32); 3] = [
 ];
 
 /// Draws the axes and the scale bar.
-pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect) {
-    if app.view.shot.is_none() {
+pub(crate) fn show(session: &Session, view: &View, ui: &egui::Ui) {
+    if view.shot.is_none() {
         return;
     }
+    let rect = view.rect;
     let painter = ui.painter_at(rect);
-    axes(app, &painter, rect);
-    scale_bar(app, &painter, rect);
+    axes(view, &painter, rect);
+    scale_bar(session, view, &painter, rect);
 }
 
-fn axes(app: &App, painter: &egui::Painter, rect: egui::Rect) {
+fn axes(view: &View, painter: &egui::Painter, rect: egui::Rect) {
     let middle = rect.right_bottom() + egui::vec2(-46.0, -46.0);
-    let mut axes: Vec<_> = app.view.navigation.world_axes_in_view().into_iter().zip(AXES).collect();
+    let mut axes: Vec<_> = view.navigation.world_axes_in_view().into_iter().zip(AXES).collect();
     // Axes that point away are drawn first.
     axes.sort_by(|(a, _), (b, _)| b.z.total_cmp(&a.z));
     for (axis, (name, color)) in axes {
@@ -37,8 +38,8 @@ fn axes(app: &App, painter: &egui::Painter, rect: egui::Rect) {
     }
 }
 
-fn scale_bar(app: &App, painter: &egui::Painter, rect: egui::Rect) {
-    let per_point = app.view.navigation.height_at_pivot() / f64::from(rect.height().max(1.0));
+fn scale_bar(session: &Session, view: &View, painter: &egui::Painter, rect: egui::Rect) {
+    let per_point = view.navigation.height_at_pivot() / f64::from(rect.height().max(1.0));
     let length = round(per_point * 130.0);
     if !(length > 0.0 && length.is_finite()) {
         return;
@@ -53,7 +54,7 @@ fn scale_bar(app: &App, painter: &egui::Painter, rect: egui::Rect) {
             painter.line_segment([end - egui::vec2(0.0, 5.0), end], stroke);
         }
     }
-    let text = ruler(app).round_text(length);
+    let text = session.ruler().round_text(length);
     let place = left + egui::vec2(0.5 * width, -7.0);
     for (shift, color) in [(1.0, Color32::from_black_alpha(200)), (0.0, Color32::WHITE)] {
         let font = egui::FontId::proportional(12.0);

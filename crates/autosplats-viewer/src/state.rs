@@ -7,13 +7,14 @@ use autosplats::cloud::Axes;
 use autosplats_sources::Source;
 use serde::{Deserialize, Serialize};
 
-use crate::app::App;
 use crate::document::ClipBox;
 use crate::files;
 use crate::kept::StoredInput;
 use crate::loading::Appearance;
 use crate::look::Look;
 use crate::playing::Clock;
+use crate::session::Session;
+use crate::view::View;
 
 /// A session. Points and edits are not part of it; they are saved by exporting.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -44,37 +45,31 @@ enum Up {
 }
 
 impl State {
-    /// The session of `app`. It includes inputs that are still to be read.
-    pub(crate) fn of(app: &App) -> Self {
-        let layers = app.document().layers.iter().filter_map(|layer| {
+    /// What is open in `session`, and how `view` shows it. Inputs that are still to be read are part of it.
+    pub(crate) fn of(session: &Session, view: &View) -> Self {
+        let layers = session.document().layers.iter().filter_map(|layer| {
             let appearance = Appearance { visible: layer.visible, tint: layer.tint };
-            let mut kept = StoredInput::of(app.session.inputs.get(&layer.id)?, appearance);
+            let mut kept = StoredInput::of(session.inputs.get(&layer.id)?, appearance);
             kept.pose = layer.pose;
             Some(kept)
         });
-        // Inputs that failed, or are still being read, belong to the session too.
-        let started = |id| app.session.loading.contains_key(&id) || app.session.reloads.contains_key(&id);
-        let read = app.session.loader.jobs().iter().filter(|job| !started(job.id));
-        let read = read.map(|job| (&job.input, app.session.appearances.get(&job.id).copied().unwrap_or_default()));
-        let waiting = app.session.playing.waiting().map(|waiting| (waiting.input, waiting.appearance));
-        let failed = app.session.failed.iter().map(|(input, appearance)| (input, *appearance));
-        let absent = read.chain(waiting).chain(failed).map(|(input, appearance)| StoredInput::of(input, appearance));
+        let absent = session.without_layer().map(|(input, appearance)| StoredInput::of(input, appearance));
         // Points from a pipe cannot be read again.
         let again = |kept: &StoredInput| !matches!(Source::parse(&kept.source), Ok(Source::StandardInput));
         let inputs: Vec<StoredInput> = layers.chain(absent).filter(again).collect();
-        let up = app.session.up_axis.map(|axes| match axes {
+        let up = session.up_axis.map(|axes| match axes {
             Axes::ZUp => Up::Z,
             Axes::YUp => Up::Y,
             Axes::Camera => Up::Camera,
         });
         Self {
-            camera: (!inputs.is_empty()).then(|| app.view.navigation.goal_camera()),
-            clock: inputs.iter().any(StoredInput::moves).then(|| app.session.playing.clock.clone()),
+            camera: (!inputs.is_empty()).then(|| view.navigation.goal_camera()),
+            clock: inputs.iter().any(StoredInput::moves).then(|| session.playing.clock.clone()),
             inputs,
             up,
-            look: app.view.look.clone(),
-            keys: app.view.keys.clone(),
-            clip: app.document().clip,
+            look: view.look.clone(),
+            keys: view.keys.clone(),
+            clip: session.document().clip,
         }
     }
 
@@ -117,37 +112,37 @@ impl State {
     }
 
     /// Opens what the session holds. Relative paths are resolved against `folder`.
-    pub(crate) fn restore(self, app: &mut App, folder: &Path) {
+    pub(crate) fn restore(self, session: &mut Session, view: &mut View, folder: &Path) {
         let Self { inputs, camera, up, look, keys, clip, clock } = self;
-        app.view.look = look;
-        app.view.keys = keys;
-        app.session.up_axis = up.map(|up| match up {
+        view.look = look;
+        view.keys = keys;
+        session.up_axis = up.map(|up| match up {
             Up::Z => Axes::ZUp,
             Up::Y => Axes::YUp,
             Up::Camera => Axes::Camera,
         });
         if clip.is_some() {
-            app.settle(|document| document.clip = clip);
+            session.settle(|document| document.clip = clip);
         }
         if let Some(clock) = clock {
-            app.session.playing.clock = clock;
-            app.session.playing.clock.hold();
+            session.playing.clock = clock;
+            session.playing.clock.hold();
         }
         for kept in inputs {
             match kept.open(folder) {
                 Ok((input, appearance)) => {
                     // Inputs named on the command line may be in the session too.
-                    let name = App::source_name(&input);
-                    let named = app.session.loader.jobs().iter().any(|job| App::source_name(&job.input) == name);
-                    if !named && !app.session.playing.has(&name) {
-                        app.open_as(input, appearance);
+                    let name = input.source_name();
+                    let named = session.loader.jobs().iter().any(|job| job.input.source_name() == name);
+                    if !named && !session.playing.has(&name) {
+                        session.open_as(input, appearance);
                     }
                 }
-                Err(error) => app.ui.messages.error(error.to_string()),
+                Err(error) => session.messages.error(error.to_string()),
             }
         }
         if let Some(camera) = camera {
-            app.set_camera(&camera);
+            view.set_camera(&camera);
         }
     }
 }
@@ -164,6 +159,7 @@ mod tests {
 
     use super::*;
     use crate::Input;
+    use crate::app::App;
 
     #[test]
     fn states_come_back() {
@@ -195,26 +191,30 @@ mod tests {
         let columns = Some(["x", "-", "y", "z"].map(String::from).to_vec());
         let options = ReadOptions { columns, keep_no_returns: true, ..ReadOptions::default() };
         let world_from_input = DMat4::from_translation(DVec3::X);
-        first.open(Input { options, world_from_input, ..Input::file(file) });
+        first.session.open(Input { options, world_from_input, ..Input::file(file) });
         let clip = ClipBox::new(DVec3::NEG_ONE, DVec3::ONE);
-        first.change(|document| document.clip = Some(clip));
-        let kept = State::of(&first);
+        first.session.change(|document| document.clip = Some(clip));
+        let kept = State::of(&first.session, &first.view);
         kept.write(&path).expect("written");
         let mut second = app();
-        State::read(&path).expect("read").restore(&mut second, folder.path());
+        State::read(&path).expect("read").restore(&mut second.session, &mut second.view, folder.path());
         // The navigation keeps orientations as quaternions, whose conversion rounds.
         let without = |state: State| State { camera: None, ..state };
         let kept = without(kept);
-        assert_eq!(without(State::of(&second)), kept, "what was still to be read is no less a part of it");
+        assert_eq!(
+            without(State::of(&second.session, &second.view)),
+            kept,
+            "what was still to be read is no less a part of it"
+        );
         let start = std::time::Instant::now();
-        while second.document().layers.is_empty() || !second.session.loader.jobs().is_empty() {
+        while second.session.document().layers.is_empty() || !second.session.loader.jobs().is_empty() {
             assert!(start.elapsed().as_secs() < 60, "it is read");
-            second.follow_files();
+            second.session.follow(0.0);
             std::thread::sleep(std::time::Duration::from_millis(2));
         }
-        assert_eq!(without(State::of(&second)), kept, "nor what was read");
-        assert_eq!(second.document().clip, Some(clip), "the box clips");
-        let layer = &second.document().layers[0];
+        assert_eq!(without(State::of(&second.session, &second.view)), kept, "nor what was read");
+        assert_eq!(second.session.document().clip, Some(clip), "the box clips");
+        let layer = &second.session.document().layers[0];
         assert_eq!(layer.cloud.len(), 3, "the sensor's own place is kept");
         assert_eq!(layer.position(2), DVec3::new(5.0, 5.0, 6.0), "by the columns that were told, where it stood");
     }

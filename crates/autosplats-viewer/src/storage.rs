@@ -2,21 +2,22 @@
 
 use std::path::PathBuf;
 
-use crate::app::App;
 use crate::kept::StoredInput;
 use crate::look::Look;
+use crate::session::Session;
+use crate::view::View;
 
 const LOOK: &str = "look";
 const RECENT: &str = "recent";
 
 /// Stores the look and the recent inputs, with how these are read and played.
-pub(crate) fn save(app: &App, storage: &mut dyn eframe::Storage) {
-    let mut look = app.view.look.clone();
+pub(crate) fn save(session: &Session, view: &View, storage: &mut dyn eframe::Storage) {
+    let mut look = view.look.clone();
     // Value range and exposure belong to one file's values and colours.
     look.settings.shading.range = None;
     look.settings.shading.exposure = None;
     eframe::set_value(storage, LOOK, &look);
-    eframe::set_value(storage, RECENT, &app.session.recent);
+    eframe::set_value(storage, RECENT, &session.recent);
 }
 
 /// Loads what was stored. Values that this version does not understand become defaults.

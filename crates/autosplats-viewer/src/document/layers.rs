@@ -162,7 +162,7 @@ pub(crate) fn bounds_of(overview: &PointCloud) -> Option<[DVec3; 2]> {
 }
 
 /// Whether a matrix is an affine map with an inverse.
-pub(super) fn can_place(matrix: &DMat4) -> bool {
+pub(crate) fn can_place(matrix: &DMat4) -> bool {
     let affine = matrix.is_finite() && matrix.row(3).to_array() == [0.0, 0.0, 0.0, 1.0];
     affine && matrix.determinant() != 0.0 && matrix.inverse().is_finite()
 }

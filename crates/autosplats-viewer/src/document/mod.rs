@@ -37,7 +37,7 @@ pub(crate) use self::{
     export::{ExportError, ExportScope, Exported, Replace, export},
     history::{History, grouped, label},
     layer::{Counts, Layer, LayerId},
-    layers::bounds_of,
+    layers::{bounds_of, can_place},
     pick::{PickedPoint, shortest},
     region::Region,
     select::SelectMode,

@@ -4,12 +4,11 @@
 use autosplats::cloud::glam::{DMat4, DVec3};
 use eframe::egui::{Color32, Painter, Pos2, Stroke};
 
-use super::view::{Shape, View, along, angle, on_plane};
+use super::lens::{Shape, WindowLens, along, angle, on_plane};
 use super::{Handle, line};
-use crate::app::App;
 use crate::document::{Grip, about};
 use crate::measure::angle_text;
-use crate::tools::ruler;
+use crate::session::Session;
 
 /// Start and end of an arrow, screen points from the middle.
 const ARROW_ENDS_POINTS: [f64; 2] = [16.0, 78.0];
@@ -44,31 +43,37 @@ enum Grabbed {
 }
 
 impl Drag {
-    pub(super) fn begin(app: &App, view: &View, handle: Handle, place: Pos2) -> Option<Self> {
-        Self::of(app.document().grip(), super::middle(app)?, view, handle, place)
+    pub(super) fn begin(
+        session: &Session,
+        middle: DVec3,
+        lens: &WindowLens,
+        handle: Handle,
+        place: Pos2,
+    ) -> Option<Self> {
+        Self::of(session.document().grip(), middle, lens, handle, place)
     }
 
-    fn of(grip: Grip, from: DVec3, view: &View, handle: Handle, place: Pos2) -> Option<Self> {
-        let ray = view.ray(place);
+    fn of(grip: Grip, from: DVec3, lens: &WindowLens, handle: Handle, place: Pos2) -> Option<Self> {
+        let ray = lens.ray(place);
         let grabbed = match handle {
             Handle::Arrow(axis) => Grabbed::Along(along(from, DVec3::AXES[axis], ray)?),
             Handle::Ring(axis) => Grabbed::At(on_plane(from, DVec3::AXES[axis], ray)?),
-            _ => Grabbed::At(on_plane(from, view.forward, ray)?),
+            _ => Grabbed::At(on_plane(from, lens.forward, ray)?),
         };
         Some(Self { handle, grip, from, grabbed, turned: 0.0, matrix: DMat4::IDENTITY })
     }
 
     /// Moves the points to follow the pointer.
-    pub(super) fn follow(&mut self, app: &mut App, view: &View, place: Pos2, stepped: bool) {
+    pub(super) fn follow(&mut self, session: &mut Session, lens: &WindowLens, place: Pos2, stepped: bool) {
         let before = self.matrix;
-        self.matrix = self.map(view, place, stepped).unwrap_or(before);
+        self.matrix = self.map(lens, place, stepped).unwrap_or(before);
         if self.matrix != before {
-            app.change(|document| document.move_gripped(&self.grip, &self.matrix));
+            session.change(|document| document.move_gripped(&self.grip, &self.matrix));
         }
     }
 
-    fn map(&mut self, view: &View, place: Pos2, stepped: bool) -> Option<DMat4> {
-        let ray = view.ray(place);
+    fn map(&mut self, lens: &WindowLens, place: Pos2, stepped: bool) -> Option<DMat4> {
+        let ray = lens.ray(place);
         Some(match (self.handle, self.grabbed) {
             (Handle::Arrow(axis), Grabbed::Along(start)) => {
                 let axis = DVec3::AXES[axis];
@@ -83,7 +88,7 @@ impl Drag {
                 self.turned = angle + turn * ((self.turned - angle) / turn).round();
                 about(self.from, DMat4::from_axis_angle(axis, self.radians(stepped)))
             }
-            (_, Grabbed::At(start)) => DMat4::from_translation(on_plane(self.from, view.forward, ray)? - start),
+            (_, Grabbed::At(start)) => DMat4::from_translation(on_plane(self.from, lens.forward, ray)? - start),
             (_, Grabbed::Along(_)) => return None,
         })
     }
@@ -94,16 +99,16 @@ impl Drag {
     }
 
     /// Moves the points back.
-    pub(super) fn cancel(&self, app: &mut App) {
-        app.change(|document| document.move_gripped(&self.grip, &DMat4::IDENTITY));
+    pub(super) fn cancel(&self, session: &mut Session) {
+        session.change(|document| document.move_gripped(&self.grip, &DMat4::IDENTITY));
     }
 
     /// Makes the drag an undo step.
-    pub(super) fn finish(&self, app: &mut App) {
-        self.cancel(app);
+    pub(super) fn finish(&self, session: &mut Session) {
+        self.cancel(session);
         if self.matrix != DMat4::IDENTITY {
             let verb = if matches!(self.handle, Handle::Ring(_)) { "Turn" } else { "Move" };
-            app.edit_points(verb, |document| document.move_gripped(&self.grip, &self.matrix));
+            session.edit_points(verb, |document| document.move_gripped(&self.grip, &self.matrix));
         }
     }
 
@@ -113,7 +118,7 @@ impl Drag {
     }
 
     /// Distance or angle of the drag, as text.
-    pub(super) fn text(&self, app: &App) -> String {
+    pub(super) fn text(&self, session: &Session) -> String {
         match self.handle {
             Handle::Ring(axis) => {
                 let seen = self.matrix.transform_vector3(DVec3::AXES[(axis + 1) % 3]);
@@ -122,7 +127,7 @@ impl Drag {
                 angle_text((angle + turn * ((self.turned - angle) / turn).round()).to_degrees())
             }
             handle => {
-                let ruler = ruler(app);
+                let ruler = session.ruler();
                 let length = ruler.length_text(ruler.distance(self.from, self.middle()));
                 let way = self.middle() - self.from;
                 match handle {
@@ -136,40 +141,40 @@ impl Drag {
 }
 
 /// Ends of an arrow; `None` if it is seen end on.
-fn arrow(middle: DVec3, axis: usize, view: &View) -> Option<[Pos2; 2]> {
-    let unit = view.unit(middle)?;
+fn arrow(middle: DVec3, axis: usize, lens: &WindowLens) -> Option<[Pos2; 2]> {
+    let unit = lens.unit(middle)?;
     let axis = DVec3::AXES[axis];
-    along(middle, axis, view.ray(view.place(middle)?))?;
-    let [from, to] = ARROW_ENDS_POINTS.map(|points| view.place(middle + axis * (points * unit)));
+    along(middle, axis, lens.ray(lens.place(middle)?))?;
+    let [from, to] = ARROW_ENDS_POINTS.map(|points| lens.place(middle + axis * (points * unit)));
     Some([from?, to?])
 }
 
 /// Corners of a ring; `None` if it is seen edge on.
-fn ring(middle: DVec3, axis: usize, view: &View) -> Option<Vec<Pos2>> {
-    let radius = RING_RADIUS_POINTS * view.unit(middle)?;
+fn ring(middle: DVec3, axis: usize, lens: &WindowLens) -> Option<Vec<Pos2>> {
+    let radius = RING_RADIUS_POINTS * lens.unit(middle)?;
     let [across, along] = [1, 2].map(|next| DVec3::AXES[(axis + next) % 3] * radius);
-    on_plane(middle, DVec3::AXES[axis], view.ray(view.place(middle)?))?;
+    on_plane(middle, DVec3::AXES[axis], lens.ray(lens.place(middle)?))?;
     let corners = (0..RING_CORNER_COUNT).map(|corner| {
         let (sin, cos) = (corner as f64 / RING_CORNER_COUNT as f64 * std::f64::consts::TAU).sin_cos();
-        view.place(middle + across * cos + along * sin)
+        lens.place(middle + across * cos + along * sin)
     });
     corners.collect()
 }
 
 /// The handles of the selection and their shapes.
-pub(super) fn handles(middle: DVec3, view: &View) -> Vec<(Handle, Shape)> {
+pub(super) fn handles(middle: DVec3, lens: &WindowLens) -> Vec<(Handle, Shape)> {
     let mut handles = Vec::new();
-    handles.extend(view.place(middle).map(|place| (Handle::Middle, Shape::Dot(place))));
+    handles.extend(lens.place(middle).map(|place| (Handle::Middle, Shape::Dot(place))));
     for axis in 0..3 {
-        let shaft = arrow(middle, axis, view).map(|[from, to]| (Handle::Arrow(axis), Shape::Line(from, to)));
+        let shaft = arrow(middle, axis, lens).map(|[from, to]| (Handle::Arrow(axis), Shape::Line(from, to)));
         handles.extend(shaft);
-        handles.extend(ring(middle, axis, view).map(|places| (Handle::Ring(axis), Shape::Loop(places))));
+        handles.extend(ring(middle, axis, lens).map(|places| (Handle::Ring(axis), Shape::Loop(places))));
     }
     handles
 }
 
-pub(super) fn show(middle: DVec3, view: &View, painter: &Painter, taken: Option<Handle>) {
-    let mut handles = handles(middle, view);
+pub(super) fn show(middle: DVec3, lens: &WindowLens, painter: &Painter, taken: Option<Handle>) {
+    let mut handles = handles(middle, lens);
     // The dragged or hovered handle is drawn on top.
     handles.sort_by_key(|(handle, _)| (taken == Some(*handle), !matches!(handle, Handle::Ring(_))));
     for (handle, shape) in handles {
@@ -209,48 +214,48 @@ pub(super) fn show(middle: DVec3, view: &View, painter: &Painter, taken: Option<
 
 #[cfg(test)]
 mod tests {
-    use super::super::view::tests::{FAR, views};
+    use super::super::lens::tests::{FAR, views};
     use super::*;
     use crate::document::Document;
 
-    fn drag(view: &View, handle: Handle, place: Pos2) -> Drag {
-        Drag::of(Document::default().grip(), FAR, view, handle, place).expect("it is seen well")
+    fn drag(lens: &WindowLens, handle: Handle, place: Pos2) -> Drag {
+        Drag::of(Document::default().grip(), FAR, lens, handle, place).expect("it is seen well")
     }
 
     #[test]
     fn points_follow_the_pointer() {
-        for view in views() {
-            assert_eq!(handles(FAR, &view).len(), 7, "a dot, three arrows and three rings");
+        for lens in views() {
+            assert_eq!(handles(FAR, &lens).len(), 7, "a dot, three arrows and three rings");
             let taken = FAR + 0.1;
-            let place = view.place(taken).expect("before the eye");
+            let place = lens.place(taken).expect("before the eye");
             for axis in 0..3 {
                 let way = DVec3::AXES[axis] * -0.75;
                 let map =
-                    drag(&view, Handle::Arrow(axis), place).map(&view, view.place(taken + way).expect("seen"), false);
+                    drag(&lens, Handle::Arrow(axis), place).map(&lens, lens.place(taken + way).expect("seen"), false);
                 let moved = map.expect("seen from the side").transform_point3(FAR) - FAR;
                 // The grabbed point lies beside the arrow, so that it follows the pointer less exactly.
                 assert!(moved.distance(way) < 0.05, "along {axis} by {moved}, not {way}");
                 assert_eq!(moved.reject_from(way), DVec3::ZERO, "and along nothing else");
             }
-            let aside = view.forward.any_orthonormal_vector() * 0.5;
-            let to = view.place(taken + aside).expect("before the eye");
+            let aside = lens.forward.any_orthonormal_vector() * 0.5;
+            let to = lens.place(taken + aside).expect("before the eye");
             let moved =
-                drag(&view, Handle::Middle, place).map(&view, to, false).expect("seen").transform_point3(FAR) - FAR;
+                drag(&lens, Handle::Middle, place).map(&lens, to, false).expect("seen").transform_point3(FAR) - FAR;
             assert!(moved.distance(aside) < 0.02, "in the plane of the picture by {moved}, not {aside}");
         }
     }
 
     #[test]
     fn rings_turn_as_far_as_the_pointer_goes_round() {
-        for view in views() {
+        for lens in views() {
             let at = |degrees: f64| {
                 let (sin, cos) = degrees.to_radians().sin_cos();
-                view.place(FAR + DVec3::new(cos, sin, 0.0)).expect("before the eye")
+                lens.place(FAR + DVec3::new(cos, sin, 0.0)).expect("before the eye")
             };
-            let mut drag = drag(&view, Handle::Ring(2), at(0.0));
+            let mut drag = drag(&lens, Handle::Ring(2), at(0.0));
             for step in 1..=50 {
                 let degrees = f64::from(step) * 10.0;
-                let map = drag.map(&view, at(degrees), false).expect("seen from above");
+                let map = drag.map(&lens, at(degrees), false).expect("seen from above");
                 // Half a pixel, seen from the side.
                 assert!(
                     (drag.turned.to_degrees() - degrees).abs() < 0.5,
@@ -259,7 +264,7 @@ mod tests {
                 );
                 assert!(map.transform_point3(FAR).distance(FAR) < 1e-8, "the middle stays");
             }
-            let stepped = drag.map(&view, at(500.0 + 12.0), true).expect("seen from above");
+            let stepped = drag.map(&lens, at(500.0 + 12.0), true).expect("seen from above");
             let turned = angle(DVec3::Z, DVec3::X, stepped.transform_vector3(DVec3::X)).to_degrees();
             assert!((turned - 150.0).abs() < 1e-6, "512 degrees in steps of 15 are 510, not {turned}");
         }

@@ -3,45 +3,54 @@
 use autosplats::cloud::glam::{DQuat, DVec3};
 use eframe::egui;
 
-use crate::app::App;
+use crate::action::Action;
 use crate::document::ClipBox;
-use crate::gizmo;
+use crate::gizmo::Gizmo;
+use crate::session::Session;
+use crate::view::View;
 
 /// Change of a number per screen point dragged, as a share of the box's longest side.
 const DRAG_SPEED_SHARE: f64 = 0.002;
 
-pub(super) fn show(app: &mut App, context: &egui::Context) {
-    if !app.ui.panels.clip {
+pub(super) fn show(
+    gizmo: &mut Gizmo,
+    context: &egui::Context,
+    session: &Session,
+    view: &View,
+    actions: &mut Vec<Action>,
+) {
+    if !gizmo.clip {
         return;
     }
-    let mut open = true;
-    let mut clip = app.document().clip;
+    let mut clip = session.document().clip;
     let mut busy = false;
-    let place = app.view.rect.right_top() + egui::vec2(-16.0, 60.0);
+    let place = view.rect.right_top() + egui::vec2(-16.0, 60.0);
     let window = egui::Window::new("Clipping box")
-        .open(&mut open)
+        .open(&mut gizmo.clip)
         .resizable(false)
         .default_width(250.0)
         .pivot(egui::Align2::RIGHT_TOP)
         .default_pos(place);
     window.show(context, |ui| {
         if let Some(clip) = &mut clip {
-            busy = numbers(app, ui, clip);
+            busy = numbers(ui, session.up(), clip);
         }
-        buttons(app, ui, &mut clip);
+        buttons(ui, session, &mut clip);
     });
-    app.ui.panels.clip = open;
-    gizmo::preview(app, clip);
+    let changed = clip != session.document().clip;
+    if changed {
+        actions.push(Action::PreviewClip(clip));
+    }
     // Changes by dragging or typing a number become one undo step when the number is released.
-    if !busy && app.ui.tools.gizmo.is_busy() && !app.ui.tools.gizmo.is_dragging() {
-        gizmo::settle(app);
+    if !busy && (changed || session.is_clip_unsettled()) && !gizmo.is_dragging() {
+        actions.push(Action::SettleClip);
         // Points are counted again only after the change; the repaint shows the counts.
         context.request_repaint();
     }
 }
 
 /// Shows the numbers. Returns whether one of them is being dragged or typed.
-fn numbers(app: &App, ui: &mut egui::Ui, clip: &mut ClipBox) -> bool {
+fn numbers(ui: &mut egui::Ui, up: DVec3, clip: &mut ClipBox) -> bool {
     let mut busy = false;
     ui.checkbox(&mut clip.enabled, "Clips").on_hover_text("If off, all points are shown and the box is kept");
     let speed = DRAG_SPEED_SHARE * (clip.max - clip.min).max_element().max(1e-9);
@@ -65,7 +74,6 @@ fn numbers(app: &App, ui: &mut egui::Ui, clip: &mut ClipBox) -> bool {
             ui.end_row();
         }
     });
-    let up = app.up();
     let mut angle = clip.angle_about(up).to_degrees();
     ui.horizontal(|ui| {
         ui.label("Turned");
@@ -79,16 +87,16 @@ fn numbers(app: &App, ui: &mut egui::Ui, clip: &mut ClipBox) -> bool {
     busy
 }
 
-fn buttons(app: &mut App, ui: &mut egui::Ui, clip: &mut Option<ClipBox>) {
+fn buttons(ui: &mut egui::Ui, session: &Session, clip: &mut Option<ClipBox>) {
     let around = |bounds: Option<[DVec3; 2]>| bounds.map(|[min, max]| ClipBox::new(min, max));
-    let selected = app.counts().all.selected > 0;
+    let selected = session.counts().all.selected > 0;
     ui.horizontal(|ui| {
         let button = ui.add_enabled(selected, egui::Button::new("Around selected"));
         if button.on_hover_text("Put the box around the selected points").clicked() {
-            *clip = around(app.document().selected_bounds()).or(*clip);
+            *clip = around(session.document().selected_bounds()).or(*clip);
         }
         if ui.button("Reset").on_hover_text("Put the box around everything, along the axes").clicked() {
-            *clip = around(app.document().whole_bounds()).or(*clip);
+            *clip = around(session.document().whole_bounds()).or(*clip);
         }
         if ui.add_enabled(clip.is_some(), egui::Button::new("Remove")).on_hover_text("Remove the box").clicked() {
             *clip = None;

@@ -10,9 +10,12 @@ use autosplats_formats::written_formats;
 use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile, Write};
-use crate::app::App;
+use crate::action::Action;
 use crate::document::{Document, ExportError, ExportScope, Exported, LayerId, Replace, export, grouped};
+use crate::messages::MessageSender;
+use crate::session::Session;
 use crate::threads::spawn;
+use crate::view::View;
 
 /// State of the dialog and of the export.
 pub(crate) struct Export {
@@ -36,11 +39,111 @@ impl Export {
     pub(crate) fn is_writing(&self) -> bool {
         self.work.is_some()
     }
-}
 
-pub(crate) fn open(app: &mut App) {
-    app.ui.panels.export.target.open();
-    app.ui.panels.export.open = true;
+    /// Opens the dialog.
+    pub(crate) fn open(&mut self) {
+        self.target.open();
+        self.open = true;
+    }
+
+    /// Receives the result of an export, and shows the dialog. `entered` says that Enter was pressed where no control
+    /// takes it.
+    pub(super) fn show(
+        &mut self,
+        context: &egui::Context,
+        session: &Session,
+        view: &View,
+        entered: &mut bool,
+        actions: &mut Vec<Action>,
+    ) {
+        self.finish(&session.messages, actions);
+        if !self.open {
+            return;
+        }
+        let mut write = None;
+        let choices = choices(session);
+        if !choices.iter().any(|(_, what, _)| *what == self.what) {
+            self.what = ExportScope::Shown;
+            self.target.forget();
+        }
+        let window = egui::Window::new("Export points").open(&mut self.open).collapsible(false).resizable(false);
+        window.default_pos(view.rect.center() - egui::vec2(220.0, 140.0)).show(context, |ui| {
+            ui.set_width(420.0);
+            if let Some(work) = &self.work {
+                let done = work.listener.done.load(Ordering::Relaxed) as f32 / 1000.0;
+                ui.add(egui::ProgressBar::new(done).text(work.path.display().to_string()));
+                if ui.button("Stop").clicked() {
+                    work.listener.cancelled.store(true, Ordering::Relaxed);
+                }
+                return;
+            }
+            for (label, what, enabled) in choices {
+                if ui.add_enabled_ui(enabled, |ui| ui.radio_value(&mut self.what, what, label)).inner.changed() {
+                    self.target.forget();
+                }
+            }
+            ui.add_space(6.0);
+            let formats: Vec<_> = written_formats().flat_map(|(_, extensions)| extensions.iter().copied()).collect();
+            ui.small(format!("The extension of the name sets the format: .{}", formats.join(" .")));
+            let words = DialogTexts { title: "Export points", name: "points.ply", verb: "Export" };
+            write = self.target.show(ui, &words, entered, None);
+        });
+        if let Some(Write { path, replace, answered }) = write {
+            let replace = match (answered, replace) {
+                (true, _) => self.replace,
+                (false, true) => Replace::Files,
+                (false, false) => Replace::Nothing,
+            };
+            self.start(session.document().clone(), context, path, replace);
+        }
+    }
+
+    /// Starts to write the points of `document`.
+    fn start(&mut self, document: Document, context: &egui::Context, path: PathBuf, replace: Replace) {
+        let listener = Arc::new(Listener {
+            done: AtomicU32::new(0),
+            cancelled: AtomicBool::new(false),
+            notes: Mutex::default(),
+            context: context.clone(),
+        });
+        let (sender, result) = channel();
+        let what = self.what;
+        let (theirs, points, target) = (Arc::clone(&listener), document.clone(), path.clone());
+        spawn("export", move || {
+            let _ = sender.send(export(&points, what, &target, replace, &*theirs));
+            theirs.context.request_repaint();
+        });
+        self.target.forget();
+        self.work = Some(ExportJob { document, what, path, listener, result });
+    }
+
+    /// Receives the result of the export.
+    fn finish(&mut self, messages: &MessageSender, actions: &mut Vec<Action>) {
+        let Some(result) = self.work.as_ref().and_then(|work| work.result.try_recv().ok()) else { return };
+        let Some(ExportJob { document, what, path, listener, .. }) = self.work.take() else { return };
+        let notes = std::mem::take(&mut *listener.notes.lock().unwrap_or_else(PoisonError::into_inner));
+        notes.into_iter().for_each(|note| messages.note(note));
+        match result {
+            Ok(Exported { points }) => {
+                let layers = saved_layers(&document, what);
+                actions.push(Action::MarkSaved { document, layers });
+                messages.note(format!("{} points were written to {}", grouped(points), path.display()));
+                self.open = false;
+            }
+            Err(ExportError::Cancelled) => messages.note("Nothing was written"),
+            Err(error) => {
+                self.replace = match &error {
+                    ExportError::Exists { .. } => Replace::Files,
+                    ExportError::Input { .. } => Replace::Inputs,
+                    _ => Replace::Nothing,
+                };
+                // The permission to replace holds only for the points that were refused.
+                let question = self.replace != Replace::Nothing && self.what == what;
+                self.target.refuse(&path, error.to_string(), question);
+                self.open = true;
+            }
+        }
+    }
 }
 
 /// An export in progress.
@@ -76,56 +179,10 @@ impl Progress for Listener {
     }
 }
 
-pub(super) fn show(app: &mut App, context: &egui::Context) {
-    finish(app);
-    if !app.ui.panels.export.open {
-        return;
-    }
-    let mut open = true;
-    let mut write = None;
-    let choices = choices(app);
-    if !choices.iter().any(|(_, what, _)| *what == app.ui.panels.export.what) {
-        app.ui.panels.export.what = ExportScope::Shown;
-        app.ui.panels.export.target.forget();
-    }
-    let window = egui::Window::new("Export points").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(app.view.rect.center() - egui::vec2(220.0, 140.0)).show(context, |ui| {
-        ui.set_width(420.0);
-        let export = &mut app.ui.panels.export;
-        if let Some(work) = &export.work {
-            let done = work.listener.done.load(Ordering::Relaxed) as f32 / 1000.0;
-            ui.add(egui::ProgressBar::new(done).text(work.path.display().to_string()));
-            if ui.button("Stop").clicked() {
-                work.listener.cancelled.store(true, Ordering::Relaxed);
-            }
-            return;
-        }
-        for (label, what, enabled) in choices {
-            if ui.add_enabled_ui(enabled, |ui| ui.radio_value(&mut export.what, what, label)).inner.changed() {
-                export.target.forget();
-            }
-        }
-        ui.add_space(6.0);
-        let formats: Vec<_> = written_formats().flat_map(|(_, extensions)| extensions.iter().copied()).collect();
-        ui.small(format!("The extension of the name sets the format: .{}", formats.join(" .")));
-        let words = DialogTexts { title: "Export points", name: "points.ply", verb: "Export" };
-        write = export.target.show(ui, &words, &mut app.ui.panels.entered, None);
-    });
-    app.ui.panels.export.open = open;
-    if let Some(Write { path, replace, answered }) = write {
-        let replace = match (answered, replace) {
-            (true, _) => app.ui.panels.export.replace,
-            (false, true) => Replace::Files,
-            (false, false) => Replace::Nothing,
-        };
-        start(app, context, path, replace);
-    }
-}
-
 /// The choices of an export: label, scope, and whether it holds any points.
-fn choices(app: &mut App) -> Vec<(String, ExportScope, bool)> {
-    let counts = app.counts().all;
-    let document = app.document();
+fn choices(session: &Session) -> Vec<(String, ExportScope, bool)> {
+    let counts = session.counts().all;
+    let document = session.document();
     let mut choices = vec![
         ("Visible points".into(), ExportScope::Shown, counts.points > 0),
         (format!("Selected points ({})", grouped(counts.selected)), ExportScope::Selected, counts.selected > 0),
@@ -137,53 +194,6 @@ fn choices(app: &mut App) -> Vec<(String, ExportScope, bool)> {
         choices.extend(document.layers.iter().map(layer));
     }
     choices
-}
-
-fn start(app: &mut App, context: &egui::Context, path: PathBuf, replace: Replace) {
-    let document = app.document().clone();
-    let listener = Arc::new(Listener {
-        done: AtomicU32::new(0),
-        cancelled: AtomicBool::new(false),
-        notes: Mutex::default(),
-        context: context.clone(),
-    });
-    let (sender, result) = channel();
-    let what = app.ui.panels.export.what;
-    let (theirs, points, target) = (Arc::clone(&listener), document.clone(), path.clone());
-    spawn("export", move || {
-        let _ = sender.send(export(&points, what, &target, replace, &*theirs));
-        theirs.context.request_repaint();
-    });
-    app.ui.panels.export.target.forget();
-    app.ui.panels.export.work = Some(ExportJob { document, what, path, listener, result });
-}
-
-/// Receives the result of the export.
-fn finish(app: &mut App) {
-    let Some(result) = app.ui.panels.export.work.as_ref().and_then(|work| work.result.try_recv().ok()) else { return };
-    let Some(ExportJob { document, what, path, listener, .. }) = app.ui.panels.export.work.take() else { return };
-    let notes = std::mem::take(&mut *listener.notes.lock().unwrap_or_else(PoisonError::into_inner));
-    notes.into_iter().for_each(|note| app.ui.messages.note(note));
-    match result {
-        Ok(Exported { points }) => {
-            saved_layers(&document, what).into_iter().for_each(|id| app.session.history.mark_saved(&document, id));
-            app.ui.messages.note(format!("{} points were written to {}", grouped(points), path.display()));
-            app.ui.panels.export.open = false;
-        }
-        Err(ExportError::Cancelled) => app.ui.messages.note("Nothing was written"),
-        Err(error) => {
-            let export = &mut app.ui.panels.export;
-            export.replace = match &error {
-                ExportError::Exists { .. } => Replace::Files,
-                ExportError::Input { .. } => Replace::Inputs,
-                _ => Replace::Nothing,
-            };
-            // The permission to replace holds only for the points that were refused.
-            let question = export.replace != Replace::Nothing && export.what == what;
-            export.target.refuse(&path, error.to_string(), question);
-            export.open = true;
-        }
-    }
 }
 
 /// The layers that are saved by an export, as all their remaining points are in the file.

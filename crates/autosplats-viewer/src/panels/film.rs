@@ -7,12 +7,13 @@ use autosplats_film::{Error, Target, has_ffmpeg};
 use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile};
+use crate::action::Action;
 use crate::animation::{path, turntable};
-use crate::app::App;
-use crate::output;
-use crate::playing::{Clock, Reel};
+use crate::playing::{Clock, Playing, Reel};
 use crate::recording::Recording;
+use crate::session::Session;
 use crate::threads::spawn;
+use crate::view::View;
 
 /// Largest number of pictures of a film.
 const MAX_PICTURES: f64 = 1e6;
@@ -118,237 +119,242 @@ impl Default for Film {
     }
 }
 
-pub(crate) fn toggle(app: &mut App) {
-    app.ui.panels.film.target.forget();
-    app.ui.panels.film.open = !app.ui.panels.film.open;
-}
-
-pub(super) fn show(app: &mut App, context: &egui::Context) {
-    play(app, context);
-    if !app.ui.panels.film.open {
-        return;
+impl Film {
+    /// Opens or closes the window.
+    pub(crate) fn toggle(&mut self) {
+        self.target.forget();
+        self.open = !self.open;
     }
-    let mut open = true;
-    let window = egui::Window::new("Film").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(app.view.rect.right_top() + egui::vec2(-410.0, 10.0)).show(context, |ui| {
-        ui.set_width(380.0);
-        if let Some(recording) = &app.view.recording {
-            ui.add(egui::ProgressBar::new(recording.fraction()).show_percentage());
-            if ui.button("Stop").clicked() {
-                output::stop(&mut app.view.recording);
-            }
+
+    /// Continues the preview, and shows the window. `entered` says that Enter was pressed where no control takes it.
+    pub(super) fn show(
+        &mut self,
+        context: &egui::Context,
+        session: &Session,
+        view: &View,
+        entered: &mut bool,
+        actions: &mut Vec<Action>,
+    ) {
+        self.play(context, actions);
+        if !self.open {
             return;
         }
-        way(app, ui);
-        time(app, ui);
-        ui.separator();
-        let ready = has_cameras(app);
-        ui.horizontal(|ui| {
-            let given = clock(app).map(|clock| app.ui.panels.film.seconds(Some(clock)));
-            let film = &mut app.ui.panels.film;
-            match given.filter(|_| film.time == Time::Once) {
-                Some(mut seconds) => {
-                    let number = egui::DragValue::new(&mut seconds).max_decimals(1).suffix(" s");
-                    ui.add_enabled(false, number).on_disabled_hover_text("As long as the played span");
+        let mut open = true;
+        let window = egui::Window::new("Film").open(&mut open).collapsible(false).resizable(false);
+        window.default_pos(view.rect.right_top() + egui::vec2(-410.0, 10.0)).show(context, |ui| {
+            ui.set_width(380.0);
+            if let Some(recording) = &view.recording {
+                ui.add(egui::ProgressBar::new(recording.fraction()).show_percentage());
+                if ui.button("Stop").clicked() {
+                    actions.push(Action::StopRecording);
                 }
-                None => {
-                    ui.add(egui::DragValue::new(&mut film.seconds).range(0.1..=600.0).speed(0.1).suffix(" s"));
-                }
+                return;
             }
-            ui.add(egui::DragValue::new(&mut film.rate).range(1..=120).suffix(" pictures a second"));
-            let playing = film.played.is_some();
-            let button = ui.add_enabled(ready, egui::Button::new(if playing { "Stop" } else { "Play" }));
-            if button.clicked() {
-                let began = context.input(|input| input.time);
-                app.ui.panels.film.played = (!playing).then(|| (moments(app), began));
-            }
-        });
-        ui.separator();
-        target(app, ui, ready);
-    });
-    app.ui.panels.film.open = open;
-}
-
-/// The choice of the camera path.
-fn way(app: &mut App, ui: &mut egui::Ui) {
-    ui.horizontal(|ui| {
-        ui.radio_value(&mut app.ui.panels.film.keyed, false, "Turntable");
-        ui.radio_value(&mut app.ui.panels.film.keyed, true, "Through keys");
-    });
-    if !app.ui.panels.film.keyed {
-        ui.add(egui::Slider::new(&mut app.ui.panels.film.degrees, -720.0..=720.0).suffix("°").text("turn"));
-        return;
-    }
-    let here = app.view.navigation.goal_camera();
-    let mut change = None;
-    ui.horizontal(|ui| {
-        if ui.button("Add this view").clicked() {
-            change = Some((app.view.keys.len(), Some(here)));
-        }
-        ui.weak(format!("{} keys", app.view.keys.len()));
-    });
-    egui::ScrollArea::vertical().max_height(140.0).show(ui, |ui| {
-        for number in 0..app.view.keys.len() {
+            self.way(ui, view, actions);
+            self.choose_time(ui, &session.playing);
+            ui.separator();
+            let ready = self.has_cameras(session, view);
             ui.horizontal(|ui| {
-                if ui.link(format!("Key {}", number + 1)).on_hover_text("Go there").clicked() {
-                    let camera = app.view.keys[number];
-                    app.view.navigation.go_to(&camera, false);
+                let given = self.clock(&session.playing).map(|clock| self.seconds(Some(clock)));
+                match given.filter(|_| self.time == Time::Once) {
+                    Some(mut seconds) => {
+                        let number = egui::DragValue::new(&mut seconds).max_decimals(1).suffix(" s");
+                        ui.add_enabled(false, number).on_disabled_hover_text("As long as the played span");
+                    }
+                    None => {
+                        ui.add(egui::DragValue::new(&mut self.seconds).range(0.1..=600.0).speed(0.1).suffix(" s"));
+                    }
                 }
-                if ui.small_button("Replace").on_hover_text("By the present view").clicked() {
-                    app.view.keys[number] = here;
-                }
-                if ui.small_button("×").on_hover_text("Remove this key").clicked() {
-                    change = Some((number, None));
+                ui.add(egui::DragValue::new(&mut self.rate).range(1..=120).suffix(" pictures a second"));
+                let playing = self.played.is_some();
+                let button = ui.add_enabled(ready, egui::Button::new(if playing { "Stop" } else { "Play" }));
+                if button.clicked() {
+                    let began = context.input(|input| input.time);
+                    self.played = (!playing).then(|| (self.moments(session, view), began));
                 }
             });
+            ui.separator();
+            let recording = self.target(ui, session, view, ready, entered);
+            actions.extend(recording.map(|recording| Action::Record(Box::new(recording))));
+        });
+        self.open = open;
+    }
+
+    /// The choice of the camera path.
+    fn way(&mut self, ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
+        ui.horizontal(|ui| {
+            ui.radio_value(&mut self.keyed, false, "Turntable");
+            ui.radio_value(&mut self.keyed, true, "Through keys");
+        });
+        if !self.keyed {
+            ui.add(egui::Slider::new(&mut self.degrees, -720.0..=720.0).suffix("°").text("turn"));
+            return;
         }
-    });
-    match change {
-        Some((_, Some(camera))) => app.view.keys.push(camera),
-        Some((number, None)) => {
-            app.view.keys.remove(number);
-        }
-        None => {}
-    }
-}
-
-/// The choice of how time runs, if an input has a timeline.
-fn time(app: &mut App, ui: &mut egui::Ui) {
-    if !app.session.playing.has_timeline() {
-        return;
-    }
-    ui.separator();
-    let [begin, end] = app.session.playing.clock.span();
-    let (speed, looped) = (app.session.playing.clock.speed, app.session.playing.clock.looped);
-    ui.horizontal(|ui| {
-        ui.label("Time");
-        let time = &mut app.ui.panels.film.time;
-        ui.radio_value(time, Time::Runs, "runs").on_hover_text("Playback continues for the length of the film");
-        ui.radio_value(time, Time::Once, "runs once").on_hover_text("The film is as long as the played span");
-        ui.radio_value(time, Time::Stands, "stands still").on_hover_text("All pictures show the present frame");
-    });
-    let film = &app.ui.panels.film;
-    let around = if looped { ", repeatedly" } else { ", then standing still" };
-    let around = if film.time == Time::Runs && film.seconds * speed > end - begin { around } else { "" };
-    let words = match film.time {
-        Time::Stands => format!("{:.2} s in all pictures", app.session.playing.clock.position()),
-        _ => format!("{begin:.2} to {end:.2} s at {speed:.2}×{around}"),
-    };
-    ui.weak(words).on_hover_text("Begin, end, speed and loop are those of the timeline");
-    if app.session.playing.is_live() {
-        ui.weak("Live inputs stand still.");
-    }
-}
-
-/// The clock, if time runs in the film.
-fn clock(app: &App) -> Option<&Clock> {
-    let runs = app.ui.panels.film.time != Time::Stands && app.session.playing.has_timeline();
-    runs.then_some(&app.session.playing.clock)
-}
-
-/// Whether the film has cameras.
-fn has_cameras(app: &App) -> bool {
-    !app.document().layers.is_empty() && (!app.ui.panels.film.keyed || !app.view.keys.is_empty())
-}
-
-/// Why the film cannot be made, if time is to run; `None` if it can.
-fn problem(app: &App) -> Option<String> {
-    let clock = clock(app)?;
-    let pictures = app.ui.panels.film.seconds(Some(clock)) * f64::from(app.ui.panels.film.rate);
-    if pictures > MAX_PICTURES {
-        return Some(format!(
-            "The film has {pictures:.0} pictures, more than {MAX_PICTURES:.0}; play a part, or faster"
-        ));
-    }
-    if let Some(waiting) = app.session.playing.waiting().next() {
-        return Some(format!("{} has no points yet: {}", waiting.input.name, waiting.why));
-    }
-    let unsaved = app
-        .session
-        .history
-        .unsaved()
-        .find(|&id| app.session.playing.shows(id))
-        .and_then(|id| app.document().layer(id))?;
-    Some(format!("{} has unsaved edits of one frame; export or undo them, or let time stand still", unsaved.name))
-}
-
-/// The cameras of the film and their times, a million at most.
-fn moments(app: &App) -> Vec<FilmPicture> {
-    let (film, clock) = (&app.ui.panels.film, clock(app));
-    let pictures = film.pictures(clock);
-    let cameras = if app.document().layers.is_empty() {
-        Vec::new()
-    } else if film.keyed {
-        path(&app.view.keys, pictures)
-    } else {
-        turntable(&app.view.navigation.goal_camera(), app.up(), film.degrees, pictures)
-    };
-    let place = |picture: usize| clock.map(|clock| clock.place_after(picture as f64 / f64::from(film.rate)));
-    cameras.into_iter().enumerate().map(|(picture, camera)| FilmPicture { camera, place: place(picture) }).collect()
-}
-
-/// The output file. `ready` says whether the film has cameras.
-fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
-    let context = ui.ctx().clone();
-    let film = &mut app.ui.panels.film;
-    ui.horizontal(|ui| {
-        ui.add(egui::DragValue::new(&mut film.size[0]).range(16..=MAX_SIDE).suffix(" px"));
-        ui.label("×");
-        ui.add(egui::DragValue::new(&mut film.size[1]).range(16..=MAX_SIDE).suffix(" px"));
-    });
-    let ffmpeg = film.has_ffmpeg(&context);
-    let pictures = app.ui.panels.film.pictures(clock(app));
-    let unready = problem(app);
-    let film = &mut app.ui.panels.film;
-    if film.refused.take_if(|refused| *refused != pictures).is_some() {
-        film.target.forget();
-    }
-    let problem = match Target::new(&film.target.path()) {
-        Err(Error::Name { why, .. }) => Some(why[..1].to_uppercase() + &why[1..]),
-        Err(error) => Some(error.to_string()),
-        Ok(Target::Film(_)) if ffmpeg == Some(false) => {
-            Some("ffmpeg is not installed; a name that ends in .png writes the pictures".into())
-        }
-        Ok(_) if !ready => Some("There is no camera path yet".into()),
-        Ok(_) => unready,
-    };
-    let words = DialogTexts { title: "Save film", name: "film.mp4", verb: "Write" };
-    let Some(write) = film.target.show(ui, &words, &mut app.ui.panels.entered, problem) else { return };
-    let Ok(target) = Target::new(&write.path) else { return };
-    // The system's dialog has asked about one name only, but a film of pictures has many.
-    let there = target.existing(pictures).filter(|there| !(write.answered || write.replace && *there == write.path));
-    if let Some(there) = there {
-        film.target.refuse(&write.path, format!("{} exists already", there.display()), true);
-        film.refused = Some(pictures);
-        return;
-    }
-    film.target.forget();
-    film.played = None;
-    let (size, rate) = (film.size, film.rate);
-    let moments = moments(app);
-    let cameras = moments.iter().map(|moment| moment.camera).collect();
-    let places: Vec<f64> = moments.iter().filter_map(|moment| moment.place).collect();
-    let runs = !places.is_empty();
-    let reel =
-        runs.then(|| Reel::start(app.session.playing.tracks(&places), app.ui.messages.sender(), context.clone()));
-    let wish = app.wish(size, false);
-    app.view.recording = Some(Recording::start(wish, cameras, reel, rate, target, &context));
-}
-
-/// Continues the preview.
-fn play(app: &mut App, context: &egui::Context) {
-    let Some((moments, began)) = &app.ui.panels.film.played else { return };
-    let picture = (context.input(|input| input.time) - began) * f64::from(app.ui.panels.film.rate);
-    match moments.get(picture as usize) {
-        Some(&FilmPicture { camera, place }) => {
-            app.view.navigation.go_to(&camera, true);
-            if let Some(place) = place {
-                app.session.playing.clock.playing = false;
-                app.session.playing.clock.seek(place);
+        let here = view.navigation.goal_camera();
+        let mut keys = view.keys.clone();
+        ui.horizontal(|ui| {
+            if ui.button("Add this view").clicked() {
+                keys.push(here);
             }
-            app.note_movement();
-            context.request_repaint();
+            ui.weak(format!("{} keys", view.keys.len()));
+        });
+        egui::ScrollArea::vertical().max_height(140.0).show(ui, |ui| {
+            for (number, key) in view.keys.iter().enumerate() {
+                ui.horizontal(|ui| {
+                    if ui.link(format!("Key {}", number + 1)).on_hover_text("Go there").clicked() {
+                        actions.push(Action::GoTo(*key));
+                    }
+                    if ui.small_button("Replace").on_hover_text("By the present view").clicked() {
+                        keys[number] = here;
+                    }
+                    if ui.small_button("×").on_hover_text("Remove this key").clicked() {
+                        keys.remove(number);
+                    }
+                });
+            }
+        });
+        if keys != view.keys {
+            actions.push(Action::SetKeys(keys));
         }
-        None => app.ui.panels.film.played = None,
+    }
+
+    /// The choice of how time runs, if an input has a timeline.
+    fn choose_time(&mut self, ui: &mut egui::Ui, playing: &Playing) {
+        if !playing.has_timeline() {
+            return;
+        }
+        ui.separator();
+        let [begin, end] = playing.clock.span();
+        let (speed, looped) = (playing.clock.speed, playing.clock.looped);
+        ui.horizontal(|ui| {
+            ui.label("Time");
+            let time = &mut self.time;
+            ui.radio_value(time, Time::Runs, "runs").on_hover_text("Playback continues for the length of the film");
+            ui.radio_value(time, Time::Once, "runs once").on_hover_text("The film is as long as the played span");
+            ui.radio_value(time, Time::Stands, "stands still").on_hover_text("All pictures show the present frame");
+        });
+        let around = if looped { ", repeatedly" } else { ", then standing still" };
+        let around = if self.time == Time::Runs && self.seconds * speed > end - begin { around } else { "" };
+        let words = match self.time {
+            Time::Stands => format!("{:.2} s in all pictures", playing.clock.position()),
+            _ => format!("{begin:.2} to {end:.2} s at {speed:.2}×{around}"),
+        };
+        ui.weak(words).on_hover_text("Begin, end, speed and loop are those of the timeline");
+        if playing.is_live() {
+            ui.weak("Live inputs stand still.");
+        }
+    }
+
+    /// The clock, if time runs in the film.
+    fn clock<'a>(&self, playing: &'a Playing) -> Option<&'a Clock> {
+        let runs = self.time != Time::Stands && playing.has_timeline();
+        runs.then_some(&playing.clock)
+    }
+
+    /// Whether the film has cameras.
+    fn has_cameras(&self, session: &Session, view: &View) -> bool {
+        !session.document().layers.is_empty() && (!self.keyed || !view.keys.is_empty())
+    }
+
+    /// Why the film cannot be made, if time is to run; `None` if it can.
+    fn problem(&self, session: &Session) -> Option<String> {
+        let clock = self.clock(&session.playing)?;
+        let pictures = self.seconds(Some(clock)) * f64::from(self.rate);
+        if pictures > MAX_PICTURES {
+            return Some(format!(
+                "The film has {pictures:.0} pictures, more than {MAX_PICTURES:.0}; play a part, or faster"
+            ));
+        }
+        if let Some(waiting) = session.playing.waiting().next() {
+            return Some(format!("{} has no points yet: {}", waiting.input.name, waiting.why));
+        }
+        let unsaved = session
+            .history
+            .unsaved()
+            .find(|&id| session.playing.shows(id))
+            .and_then(|id| session.document().layer(id))?;
+        Some(format!("{} has unsaved edits of one frame; export or undo them, or let time stand still", unsaved.name))
+    }
+
+    /// The cameras of the film and their times, a million at most.
+    fn moments(&self, session: &Session, view: &View) -> Vec<FilmPicture> {
+        let clock = self.clock(&session.playing);
+        let pictures = self.pictures(clock);
+        let cameras = if session.document().layers.is_empty() {
+            Vec::new()
+        } else if self.keyed {
+            path(&view.keys, pictures)
+        } else {
+            turntable(&view.navigation.goal_camera(), session.up(), self.degrees, pictures)
+        };
+        let place = |picture: usize| clock.map(|clock| clock.place_after(picture as f64 / f64::from(self.rate)));
+        cameras.into_iter().enumerate().map(|(picture, camera)| FilmPicture { camera, place: place(picture) }).collect()
+    }
+
+    /// The output file. Returns the film, once it is to be written. `ready` says whether the film has cameras.
+    fn target(
+        &mut self,
+        ui: &mut egui::Ui,
+        session: &Session,
+        view: &View,
+        ready: bool,
+        entered: &mut bool,
+    ) -> Option<Recording> {
+        let context = ui.ctx().clone();
+        ui.horizontal(|ui| {
+            ui.add(egui::DragValue::new(&mut self.size[0]).range(16..=MAX_SIDE).suffix(" px"));
+            ui.label("×");
+            ui.add(egui::DragValue::new(&mut self.size[1]).range(16..=MAX_SIDE).suffix(" px"));
+        });
+        let ffmpeg = self.has_ffmpeg(&context);
+        let pictures = self.pictures(self.clock(&session.playing));
+        let unready = self.problem(session);
+        if self.refused.take_if(|refused| *refused != pictures).is_some() {
+            self.target.forget();
+        }
+        let problem = match Target::new(&self.target.path()) {
+            Err(Error::Name { why, .. }) => Some(why[..1].to_uppercase() + &why[1..]),
+            Err(error) => Some(error.to_string()),
+            Ok(Target::Film(_)) if ffmpeg == Some(false) => {
+                Some("ffmpeg is not installed; a name that ends in .png writes the pictures".into())
+            }
+            Ok(_) if !ready => Some("There is no camera path yet".into()),
+            Ok(_) => unready,
+        };
+        let words = DialogTexts { title: "Save film", name: "film.mp4", verb: "Write" };
+        let write = self.target.show(ui, &words, entered, problem)?;
+        let target = Target::new(&write.path).ok()?;
+        // The system's dialog has asked about one name only, but a film of pictures has many.
+        let there =
+            target.existing(pictures).filter(|there| !(write.answered || write.replace && *there == write.path));
+        if let Some(there) = there {
+            self.target.refuse(&write.path, format!("{} exists already", there.display()), true);
+            self.refused = Some(pictures);
+            return None;
+        }
+        self.target.forget();
+        self.played = None;
+        let (size, rate) = (self.size, self.rate);
+        let moments = self.moments(session, view);
+        let cameras = moments.iter().map(|moment| moment.camera).collect();
+        let places: Vec<f64> = moments.iter().filter_map(|moment| moment.place).collect();
+        let runs = !places.is_empty();
+        let reel =
+            runs.then(|| Reel::start(session.playing.tracks(&places), session.messages.clone(), context.clone()));
+        let wish = view.wish(session, size, false);
+        Some(Recording::start(wish, cameras, reel, rate, target, &context))
+    }
+
+    /// Continues the preview.
+    fn play(&mut self, context: &egui::Context, actions: &mut Vec<Action>) {
+        let Some((moments, began)) = &self.played else { return };
+        let picture = (context.input(|input| input.time) - began) * f64::from(self.rate);
+        match moments.get(picture as usize) {
+            Some(&FilmPicture { camera, place }) => {
+                actions.push(Action::ShowMoment { camera, place });
+                context.request_repaint();
+            }
+            None => self.played = None,
+        }
     }
 }

@@ -6,8 +6,6 @@
 
 use eframe::egui::{self, Context, Id, LayerId, Rect};
 
-use crate::app::App;
-
 /// Places of the panels, and whether the keyboard moves the focus.
 #[derive(Default)]
 pub(crate) struct Focus {
@@ -25,6 +23,55 @@ impl Focus {
     /// Reports a panel.
     pub(super) fn part(&mut self, rect: Rect) {
         self.panels.push(rect);
+    }
+
+    /// Moves the focus to the next part of the window, or with `back` to the previous one. `picture` is the place of the picture.
+    pub(crate) fn next_part(&mut self, picture: Rect, context: &Context, back: bool) {
+        let controls = controls(context);
+        let mut windows: Vec<LayerId> = controls.iter().map(|(_, layer, _)| *layer).collect();
+        windows.retain(|layer| layer.order == egui::Order::Middle);
+        windows.dedup();
+        let panels = self.panels.iter().filter(|panel| !picture.contains(panel.center()));
+        let mut parts: Vec<WindowPart> = panels.map(|panel| WindowPart::Panel(*panel)).collect();
+        parts.extend(windows.into_iter().map(WindowPart::Window));
+        let first =
+            |part: WindowPart| controls.iter().find(|(_, layer, rect)| part.holds(*layer, *rect)).map(|(id, ..)| *id);
+        let stops: Vec<(WindowPart, Id)> = parts.into_iter().filter_map(|part| Some((part, first(part)?))).collect();
+        let focused = context.memory(|memory| memory.focused());
+        let here = focused.and_then(|focused| {
+            let (_, layer, rect) = controls.iter().find(|(id, ..)| *id == focused)?;
+            stops.iter().position(|(part, _)| part.holds(*layer, *rect))
+        });
+        // One stop more than there are parts: the picture.
+        let count = stops.len() + 1;
+        let place = here.unwrap_or(stops.len());
+        let next = if back { place + count - 1 } else { place + 1 } % count;
+        context.memory_mut(|memory| match (stops.get(next), focused) {
+            (Some((_, id)), _) => memory.request_focus(*id),
+            (None, Some(focused)) => memory.surrender_focus(focused),
+            (None, None) => {}
+        });
+        self.by_keys = true;
+    }
+
+    /// Draws a ring around the focused control, if keys have set the focus.
+    pub(super) fn ring(&mut self, context: &Context) {
+        if context.input(|input| input.pointer.any_pressed()) {
+            self.by_keys = false;
+        }
+        if !self.by_keys {
+            return;
+        }
+        let focused = context.memory(|memory| memory.focused());
+        let Some(widget) =
+            focused.and_then(|id| context.viewport(|viewport| viewport.this_pass.widgets.get(id).copied()))
+        else {
+            return;
+        };
+        let painter = context.layer_painter(LayerId::new(egui::Order::Foreground, Id::unique("focus ring")));
+        let color = context.global_style().visuals.selection.stroke.color;
+        let rect = widget.interact_rect.expand(2.0);
+        painter.rect_stroke(rect, 3.0, egui::Stroke::new(2.0, color), egui::StrokeKind::Middle);
     }
 }
 
@@ -55,53 +102,4 @@ fn controls(context: &Context) -> Vec<(Id, LayerId, Rect)> {
         let usable = all.filter(|(_, widget)| widget.enabled && widget.sense.is_focusable());
         usable.map(|(layer, widget)| (widget.id, layer, widget.rect)).collect()
     })
-}
-
-/// Moves the focus to the next part of the window, or to the previous one.
-pub(crate) fn focus_next_part(app: &mut App, context: &Context, back: bool) {
-    let controls = controls(context);
-    let mut windows: Vec<LayerId> = controls.iter().map(|(_, layer, _)| *layer).collect();
-    windows.retain(|layer| layer.order == egui::Order::Middle);
-    windows.dedup();
-    let picture = app.view.rect;
-    let panels = app.ui.panels.focus.panels.iter().filter(|panel| !picture.contains(panel.center()));
-    let mut parts: Vec<WindowPart> = panels.map(|panel| WindowPart::Panel(*panel)).collect();
-    parts.extend(windows.into_iter().map(WindowPart::Window));
-    let first =
-        |part: WindowPart| controls.iter().find(|(_, layer, rect)| part.holds(*layer, *rect)).map(|(id, ..)| *id);
-    let stops: Vec<(WindowPart, Id)> = parts.into_iter().filter_map(|part| Some((part, first(part)?))).collect();
-    let focused = context.memory(|memory| memory.focused());
-    let here = focused.and_then(|focused| {
-        let (_, layer, rect) = controls.iter().find(|(id, ..)| *id == focused)?;
-        stops.iter().position(|(part, _)| part.holds(*layer, *rect))
-    });
-    // One stop more than there are parts: the picture.
-    let count = stops.len() + 1;
-    let place = here.unwrap_or(stops.len());
-    let next = if back { place + count - 1 } else { place + 1 } % count;
-    context.memory_mut(|memory| match (stops.get(next), focused) {
-        (Some((_, id)), _) => memory.request_focus(*id),
-        (None, Some(focused)) => memory.surrender_focus(focused),
-        (None, None) => {}
-    });
-    app.ui.panels.focus.by_keys = true;
-}
-
-/// Draws a ring around the focused control, if keys have set the focus.
-pub(super) fn ring(app: &mut App, context: &Context) {
-    if context.input(|input| input.pointer.any_pressed()) {
-        app.ui.panels.focus.by_keys = false;
-    }
-    if !app.ui.panels.focus.by_keys {
-        return;
-    }
-    let focused = context.memory(|memory| memory.focused());
-    let Some(widget) = focused.and_then(|id| context.viewport(|viewport| viewport.this_pass.widgets.get(id).copied()))
-    else {
-        return;
-    };
-    let painter = context.layer_painter(LayerId::new(egui::Order::Foreground, Id::unique("focus ring")));
-    let color = context.global_style().visuals.selection.stroke.color;
-    let rect = widget.interact_rect.expand(2.0);
-    painter.rect_stroke(rect, 3.0, egui::Stroke::new(2.0, color), egui::StrokeKind::Middle);
 }

@@ -2,7 +2,6 @@
 
 use eframe::egui;
 
-use crate::app::App;
 use crate::commands::Command;
 
 const MOUSE: [(&str, &str); 13] = [
@@ -21,9 +20,8 @@ const MOUSE: [(&str, &str); 13] = [
     ("Drag dots, arrows, rings", "Move the faces of the clipping box, or the selection; Escape cancels"),
 ];
 
-pub(super) fn show(app: &mut App, context: &egui::Context) {
-    let mut open = app.ui.panels.help;
-    let window = egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).resizable(false);
+pub(super) fn show(open: &mut bool, context: &egui::Context) {
+    let window = egui::Window::new("Keys and mouse").open(open).collapsible(false).resizable(false);
     window.anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(context, |ui| {
         ui.set_width(440.0);
         let height = context.content_rect().height() - 140.0;
@@ -42,5 +40,4 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             });
         });
     });
-    app.ui.panels.help = open;
 }

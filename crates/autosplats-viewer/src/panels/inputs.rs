@@ -3,45 +3,134 @@
 use autosplats::cloud::glam::DVec3;
 use eframe::egui;
 
-use crate::app::App;
-use crate::document::{Document, LayerId, grouped, shortest};
-use crate::playing::WaitingInput;
+use super::layer::{Naming, naming};
+use crate::action::Action;
+use crate::commands::Command;
+use crate::document::{Layer, LayerId, PickedPoint, grouped, shortest};
+use crate::loading::Loader;
+use crate::playing::{Playing, WaitingInput};
+use crate::session::Session;
+use crate::view::View;
 
-pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
-    let panel = egui::Panel::left("inputs").default_size(210.0).size_range(150.0..=420.0);
-    let shown = panel.show(ui, |ui| {
-        ui.add_space(4.0);
-        ui.horizontal(|ui| {
-            ui.strong("Inputs");
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui.small_button("+").on_hover_text("Open more").clicked() {
-                    let context = ui.ctx().clone();
-                    app.ui.panels.dialogs.open(&context);
+/// The list of inputs.
+pub(crate) struct Inputs {
+    pub(crate) open: bool,
+    /// The name that is being typed.
+    naming: Option<Naming>,
+}
+
+impl Default for Inputs {
+    fn default() -> Self {
+        Self { open: true, naming: None }
+    }
+}
+
+impl Inputs {
+    /// Shows the list. Returns its place.
+    pub(super) fn show(&mut self, ui: &mut egui::Ui, session: &Session, actions: &mut Vec<Action>) -> egui::Rect {
+        let panel = egui::Panel::left("inputs").default_size(210.0).size_range(150.0..=420.0);
+        let shown = panel.show(ui, |ui| {
+            ui.add_space(4.0);
+            ui.horizontal(|ui| {
+                ui.strong("Inputs");
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    if ui.small_button("+").on_hover_text("Open more").clicked() {
+                        actions.push(Command::Open.into());
+                    }
+                });
+            });
+            ui.separator();
+            egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                loading(ui, &session.loader);
+                waiting(ui, &session.playing, actions);
+                for layer in &session.document().layers {
+                    self.layer(ui, session, layer, actions);
+                }
+                if session.is_empty() {
+                    ui.weak("Nothing is open.");
                 }
             });
         });
-        ui.separator();
-        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            loading(app, ui);
-            waiting(app, ui);
-            let ids: Vec<LayerId> = app.document().layers.iter().map(|layer| layer.id).collect();
-            for id in ids {
-                layer(app, ui, id);
-            }
-            if app.document().layers.is_empty()
-                && app.session.loader.jobs().is_empty()
-                && app.session.playing.is_empty()
-            {
-                ui.weak("Nothing is open.");
-            }
+        shown.response.rect
+    }
+
+    /// Shows a layer.
+    fn layer(&mut self, ui: &mut egui::Ui, session: &Session, layer: &Layer, actions: &mut Vec<Action>) {
+        let (id, name, path) = (layer.id, &layer.name, &layer.path);
+        let counts = session.counts().layers.get(&id).copied().unwrap_or_default();
+        let unsaved = session.history.is_unsaved(id);
+        ui.push_id(id, |ui| {
+            ui.horizontal(|ui| {
+                let mut shown = layer.visible;
+                if ui.checkbox(&mut shown, "").on_hover_text("Show this input").changed() {
+                    actions.push(Action::SetVisible(id, shown));
+                }
+                let mut color = layer.tint.unwrap_or([200, 200, 200]);
+                if super::color::button(ui, &mut color, "One colour for all its points") {
+                    actions.push(Action::SetTint(id, Some(color)));
+                }
+                if naming(&mut self.naming, ui, layer, actions) {
+                    return;
+                }
+                let text = if unsaved { format!("{name} *") } else { name.clone() };
+                let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
+                let file = path.as_ref().map_or_else(String::new, |path| format!("\n{}", path.display()));
+                let edits = if unsaved { "\nIts edits are not saved" } else { "" };
+                let begins =
+                    session.playing.alignment(id).map_or_else(String::new, |words| format!("\nIt begins {words}"));
+                if label.double_clicked() {
+                    self.naming = Some(Naming::new(layer));
+                }
+                let hint = format!("{name}{file}{edits}{begins}");
+                label.on_hover_text(hint).context_menu(|ui| self.menu(ui, session, layer, actions));
+            });
+            ui.horizontal_wrapped(|ui| {
+                ui.add_space(22.0);
+                let mut figures = format!("{} points", grouped(counts.points));
+                for (count, what) in
+                    [(counts.selected, "selected"), (counts.hidden, "hidden"), (counts.deleted, "deleted")]
+                {
+                    if count > 0 {
+                        figures += &format!(", {} {what}", grouped(count));
+                    }
+                }
+                ui.small(figures);
+                ui.menu_button("…", |ui| self.menu(ui, session, layer, actions))
+                    .response
+                    .on_hover_text("Actions for this input");
+            });
         });
-    });
-    app.ui.panels.focus.part(shown.response.rect);
+        ui.add_space(4.0);
+    }
+
+    /// Shows the menu of a layer.
+    fn menu(&mut self, ui: &mut egui::Ui, session: &Session, layer: &Layer, actions: &mut Vec<Action>) {
+        let id = layer.id;
+        if ui.button("Fit").on_hover_text("Move the camera to show all of it").clicked() {
+            actions.push(Action::Fit(id));
+            ui.close();
+        }
+        if ui.button("Show only this").clicked() {
+            actions.push(Action::ShowOnly(id));
+            ui.close();
+        }
+        if ui.button("Its own colours").clicked() {
+            actions.push(Action::SetTint(id, None));
+            ui.close();
+        }
+        ui.separator();
+        super::layer::menu(&mut self.naming, ui, session, layer, actions);
+        ui.separator();
+        if ui.button("Remove").on_hover_text("Remove it from the list; its file stays unchanged").clicked() {
+            actions.push(Action::Remove(vec![id]));
+            ui.close();
+        }
+    }
 }
 
 /// The inputs that are being read.
-fn loading(app: &App, ui: &mut egui::Ui) {
-    for job in app.session.loader.jobs() {
+fn loading(ui: &mut egui::Ui, loader: &Loader) {
+    for job in loader.jobs() {
         ui.horizontal(|ui| {
             if ui.small_button("×").on_hover_text("Stop reading").clicked() {
                 job.cancel();
@@ -53,14 +142,13 @@ fn loading(app: &App, ui: &mut egui::Ui) {
 }
 
 /// The playing inputs that have no points yet, and why.
-fn waiting(app: &mut App, ui: &mut egui::Ui) {
-    let mut given_up = None;
-    for WaitingInput { number, input, why, read, .. } in app.session.playing.waiting() {
+fn waiting(ui: &mut egui::Ui, playing: &Playing, actions: &mut Vec<Action>) {
+    for WaitingInput { number, input, why, read, .. } in playing.waiting() {
         ui.horizontal(|ui| {
             if ui.small_button("×").on_hover_text("Do not open it").clicked() {
-                given_up = Some(number);
+                actions.push(Action::GiveUpWaiting(number));
             }
-            ui.add(egui::Label::new(&*input.name).truncate()).on_hover_text(App::source_name(input));
+            ui.add(egui::Label::new(&*input.name).truncate()).on_hover_text(input.source_name());
         });
         ui.horizontal_wrapped(|ui| {
             ui.add_space(22.0);
@@ -69,133 +157,15 @@ fn waiting(app: &mut App, ui: &mut egui::Ui) {
         });
         ui.add_space(4.0);
     }
-    if let Some(number) = given_up {
-        app.session.playing.give_up(number);
-    }
-}
-
-fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
-    let Some(layer) = app.document().layer(id) else { return };
-    let (name, visible, tint, path) = (layer.name.clone(), layer.visible, layer.tint, layer.path.clone());
-    let counts = app.counts().layers.get(&id).copied().unwrap_or_default();
-    let unsaved = app.session.history.is_unsaved(id);
-    ui.push_id(id, |ui| {
-        ui.horizontal(|ui| {
-            let mut shown = visible;
-            if ui.checkbox(&mut shown, "").on_hover_text("Show this input").changed() {
-                app.settle(|document| {
-                    document.set_visible(id, shown);
-                });
-            }
-            let mut color = tint.unwrap_or([200, 200, 200]);
-            if super::color::button(ui, &mut color, "One colour for all its points") {
-                app.settle(|document| {
-                    document.set_tint(id, Some(color));
-                });
-            }
-            if super::layer::naming(app, ui, id) {
-                return;
-            }
-            let text = if unsaved { format!("{name} *") } else { name.clone() };
-            let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
-            let file = path.map_or_else(String::new, |path| format!("\n{}", path.display()));
-            let edits = if unsaved { "\nIts edits are not saved" } else { "" };
-            let begins =
-                app.session.playing.alignment(id).map_or_else(String::new, |words| format!("\nIt begins {words}"));
-            if label.double_clicked() {
-                super::layer::rename(app, id);
-            }
-            label.on_hover_text(format!("{name}{file}{edits}{begins}")).context_menu(|ui| menu(app, ui, id));
-        });
-        ui.horizontal_wrapped(|ui| {
-            ui.add_space(22.0);
-            let mut figures = format!("{} points", grouped(counts.points));
-            for (count, what) in [(counts.selected, "selected"), (counts.hidden, "hidden"), (counts.deleted, "deleted")]
-            {
-                if count > 0 {
-                    figures += &format!(", {} {what}", grouped(count));
-                }
-            }
-            ui.small(figures);
-            ui.menu_button("…", |ui| menu(app, ui, id)).response.on_hover_text("Actions for this input");
-        });
-    });
-    ui.add_space(4.0);
-}
-
-fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
-    if ui.button("Fit").on_hover_text("Move the camera to show all of it").clicked() {
-        let mut alone = Document::default();
-        alone.layers.extend(app.document().layer(id).cloned());
-        let cloud = alone.overview();
-        app.fit(&cloud);
-        ui.close();
-    }
-    if ui.button("Show only this").clicked() {
-        app.settle(|document| {
-            let ids: Vec<_> = document.layers.iter().map(|layer| layer.id).collect();
-            for other in ids {
-                document.set_visible(other, other == id);
-            }
-        });
-        ui.close();
-    }
-    if ui.button("Its own colours").clicked() {
-        app.settle(|document| {
-            document.set_tint(id, None);
-        });
-        ui.close();
-    }
-    ui.separator();
-    super::layer::menu(app, ui, id);
-    ui.separator();
-    if ui.button("Remove").on_hover_text("Remove it from the list; its file stays unchanged").clicked() {
-        remove(app, vec![id]);
-        ui.close();
-    }
-}
-
-/// Removes all inputs.
-pub(crate) fn close_all(app: &mut App) {
-    app.session.loader.cancel_all();
-    app.session.playing.give_up_waiting();
-    let ids = app.document().layers.iter().map(|layer| layer.id).collect();
-    remove(app, ids);
-}
-
-/// Removes layers as an undo step. Asks first if edits would be lost.
-fn remove(app: &mut App, ids: Vec<LayerId>) {
-    if ids.iter().any(|&id| app.session.history.is_unsaved(id)) {
-        app.ui.panels.removal = ids;
-    } else {
-        remove_now(app, &ids);
-    }
-}
-
-fn remove_now(app: &mut App, ids: &[LayerId]) {
-    let incomplete = |id: &LayerId| app.document().layer(*id).is_some_and(|layer| layer.incomplete);
-    let (unread, ids): (Vec<LayerId>, Vec<LayerId>) = ids.iter().copied().partition(incomplete);
-    unread.into_iter().for_each(|id| app.give_up(id));
-    if ids.is_empty() {
-        return;
-    }
-    let label = if let [_] = ids[..] { "Remove an input" } else { "Close all" };
-    app.edit(label, |document| {
-        ids.iter().for_each(|&id| {
-            document.remove(id);
-        });
-    });
 }
 
 /// Asks before layers with unsaved edits are removed.
-pub(super) fn removal(app: &mut App, context: &egui::Context) {
-    if app.ui.panels.removal.is_empty() {
+pub(super) fn removal(ids: &mut Vec<LayerId>, context: &egui::Context, session: &Session, actions: &mut Vec<Action>) {
+    if ids.is_empty() {
         return;
     }
-    let unsaved: Vec<LayerId> =
-        app.ui.panels.removal.iter().copied().filter(|&id| app.session.history.is_unsaved(id)).collect();
-    let names: Vec<String> =
-        unsaved.iter().filter_map(|&id| app.document().layer(id)).map(|layer| layer.name.clone()).collect();
+    let unsaved = ids.iter().filter(|&&id| session.history.is_unsaved(id));
+    let names: Vec<&str> = unsaved.filter_map(|&id| session.document().layer(id)).map(|layer| &*layer.name).collect();
     let mut answer = None;
     let modal = egui::Modal::new(egui::Id::unique("removal")).show(context, |ui| {
         ui.heading("Edits are not saved");
@@ -213,12 +183,12 @@ pub(super) fn removal(app: &mut App, context: &egui::Context) {
         });
     });
     if let Some((remove, export)) = answer.or_else(|| modal.should_close().then_some((false, false))) {
-        let ids = std::mem::take(&mut app.ui.panels.removal);
+        let ids = std::mem::take(ids);
         if remove {
-            remove_now(app, &ids);
+            actions.push(Action::RemoveEdited(ids));
         }
         if export {
-            super::export::open(app);
+            actions.push(Command::Export.into());
         }
     }
 }
@@ -230,11 +200,11 @@ fn place_text(place: DVec3) -> String {
 }
 
 /// The window with information on the inspected point.
-pub(super) fn inspected(app: &mut App, context: &egui::Context) {
-    let Some(point) = app.ui.tools.inspected.clone() else { return };
+pub(super) fn inspected(inspected: &mut Option<PickedPoint>, context: &egui::Context, session: &Session, view: &View) {
+    let Some(point) = inspected else { return };
     let mut open = true;
     let window = egui::Window::new("Point").open(&mut open).resizable(true).default_width(260.0);
-    window.default_pos(app.view.rect.right_top() + egui::vec2(-290.0, 10.0)).show(context, |ui| {
+    window.default_pos(view.rect.right_top() + egui::vec2(-290.0, 10.0)).show(context, |ui| {
         egui::ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
             egui::Grid::new("point").num_columns(2).striped(true).show(ui, |ui| {
                 let mut row = |name: &str, value: &str| {
@@ -243,7 +213,7 @@ pub(super) fn inspected(app: &mut App, context: &egui::Context) {
                     ui.end_row();
                 };
                 row("Input", &point.name);
-                if let Some(words) = app.session.playing.alignment(point.layer) {
+                if let Some(words) = session.playing.alignment(point.layer) {
                     row("Begins", &words);
                 }
                 row("Index", &point.point.to_string());
@@ -266,6 +236,6 @@ pub(super) fn inspected(app: &mut App, context: &egui::Context) {
         });
     });
     if !open {
-        app.ui.tools.inspected = None;
+        *inspected = None;
     }
 }

@@ -3,8 +3,9 @@
 use autosplats_sources::Source;
 use eframe::egui;
 
-use crate::app::App;
-use crate::document::LayerId;
+use crate::action::Action;
+use crate::document::{Layer, LayerId};
+use crate::session::Session;
 
 /// A name that is being typed.
 pub(crate) struct Naming {
@@ -14,15 +15,16 @@ pub(crate) struct Naming {
     focused: bool,
 }
 
-/// Starts to rename an input.
-pub(super) fn rename(app: &mut App, id: LayerId) {
-    let Some(text) = app.document().layer(id).map(|layer| layer.name.clone()) else { return };
-    app.ui.panels.naming = Some(Naming { layer: id, text, focused: false });
+impl Naming {
+    /// Starts to rename an input.
+    pub(super) fn new(layer: &Layer) -> Self {
+        Self { layer: layer.id, text: layer.name.clone(), focused: false }
+    }
 }
 
 /// Shows a text field instead of the name of an input that is being renamed. Returns whether it is.
-pub(super) fn naming(app: &mut App, ui: &mut egui::Ui, id: LayerId) -> bool {
-    let Some(mut naming) = app.ui.panels.naming.take_if(|naming| naming.layer == id) else { return false };
+pub(super) fn naming(typed: &mut Option<Naming>, ui: &mut egui::Ui, layer: &Layer, actions: &mut Vec<Action>) -> bool {
+    let Some(mut naming) = typed.take_if(|naming| naming.layer == layer.id) else { return false };
     let field = egui::TextEdit::singleline(&mut naming.text).desired_width(ui.available_width());
     let response = ui.add(field);
     if !naming.focused {
@@ -31,41 +33,42 @@ pub(super) fn naming(app: &mut App, ui: &mut egui::Ui, id: LayerId) -> bool {
     } else if response.lost_focus() || !response.has_focus() {
         let name = naming.text.trim();
         let given_up = ui.input(|input| input.key_pressed(egui::Key::Escape)) || name.is_empty();
-        if !given_up && app.document().layer(id).is_some_and(|layer| layer.name != name) {
-            app.edit("Rename an input", |document| {
-                document.rename(id, name);
-            });
+        if !given_up && layer.name != name {
+            actions.push(Action::Rename(layer.id, name.into()));
         }
         return true;
     }
-    app.ui.panels.naming = Some(naming);
+    *typed = Some(naming);
     true
 }
 
 /// The entries of an input's menu.
-pub(super) fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
-    let layers = &app.document().layers;
+pub(super) fn menu(
+    typed: &mut Option<Naming>,
+    ui: &mut egui::Ui,
+    session: &Session,
+    layer: &Layer,
+    actions: &mut Vec<Action>,
+) {
+    let (id, layers) = (layer.id, &session.document().layers);
     let (count, place) = (layers.len(), layers.iter().position(|layer| layer.id == id).unwrap_or(0));
-    let path = layers.get(place).and_then(|layer| layer.path.clone());
-    let source = app.session.inputs.get(&id).map(|input| &input.source);
+    let source = session.inputs.get(&id).map(|input| &input.source);
     let again = source.is_some_and(|source| !matches!(source, Source::Scene(..) | Source::StandardInput));
     if ui.button("Rename…").clicked() {
-        rename(app, id);
+        *typed = Some(Naming::new(layer));
         ui.close();
     }
     if ui.button("Place…").on_hover_text("Move, turn and scale all of it").clicked() {
-        super::pose::open(app, id);
+        actions.push(Action::Place(id));
         ui.close();
     }
     for (name, enabled, to) in [("Up", place > 0, place.saturating_sub(1)), ("Down", place + 1 < count, place + 1)] {
         if ui.add_enabled(enabled, egui::Button::new(name)).on_hover_text("In the list").clicked() {
-            app.edit("Reorder the inputs", |document| {
-                document.reorder(id, to);
-            });
+            actions.push(Action::Reorder(id, to));
             ui.close();
         }
     }
-    let unsaved = app.session.history.is_unsaved(id);
+    let unsaved = session.history.is_unsaved(id);
     let reload = ui.add_enabled(again && !unsaved, egui::Button::new("Reload"));
     let reload = reload.on_hover_text("Read it again, from where it was read").on_disabled_hover_text(if unsaved {
         "It has unsaved edits, which would not fit the new points"
@@ -73,10 +76,10 @@ pub(super) fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
         "Scenes and pipes cannot be read again"
     });
     if reload.clicked() {
-        app.reload_layer(id);
+        actions.push(Action::Reload(id));
         ui.close();
     }
-    if let Some(path) = path
+    if let Some(path) = &layer.path
         && ui.button("Copy path").on_hover_text(path.display().to_string()).clicked()
     {
         ui.ctx().copy_text(path.display().to_string());

@@ -3,8 +3,10 @@
 use autosplats::{Backend, Background, Backs, ColorMap, ColorMode, SearchEngine, Settings, usual_exposure};
 use eframe::egui::{self, ComboBox, DragValue, Slider};
 
-use crate::app::App;
+use crate::action::Action;
 use crate::look::{Look, TwoFingers};
+use crate::render::Picture;
+use crate::view::View;
 
 /// Colour modes that every cloud has, or whose absence is reported.
 const MODES: [(&str, ColorMode); 9] = [
@@ -34,7 +36,10 @@ const BACKENDS: [(&str, Backend); 3] = [("auto", Backend::Auto), ("CPU", Backend
 const FINGERS: [(&str, TwoFingers); 3] =
     [("zoom", TwoFingers::Zoom), ("orbit", TwoFingers::Orbit), ("pan", TwoFingers::Pan)];
 
-pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
+/// Shows the panel. Returns its place.
+pub(super) fn show(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) -> egui::Rect {
+    let mut look = view.look.clone();
+    let picture = view.shot.as_deref();
     let panel = egui::Panel::right("look").default_size(250.0).size_range(200.0..=420.0);
     let shown = panel.show(ui, |ui| {
         ui.add_space(4.0);
@@ -42,32 +47,35 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             ui.strong("Look");
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.small_button("Reset").on_hover_text("Restore the defaults").clicked() {
-                    app.view.look = Look::default();
+                    look = Look::default();
                 }
             });
         });
         ui.separator();
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            section(ui, "Colour", |ui| color(app, ui));
-            section(ui, "Light", |ui| light(app, ui));
+            section(ui, "Colour", |ui| color(ui, &mut look, picture));
+            section(ui, "Light", |ui| light(ui, &mut look, picture));
             section(ui, "Points", |ui| {
-                ui.checkbox(&mut app.view.look.dots, "Raw points").on_hover_text("Dots instead of the surface (Tab)");
-                ui.add(Slider::new(&mut app.view.look.dot_size, 1..=8).text("dot size").suffix(" px"));
+                ui.checkbox(&mut look.dots, "Raw points").on_hover_text("Dots instead of the surface (Tab)");
+                ui.add(Slider::new(&mut look.dot_size, 1..=8).text("dot size").suffix(" px"));
             });
-            section(ui, "Surface", |ui| surface(&mut app.view.look.settings, ui));
-            section(ui, "Search", |ui| search(app, ui));
+            section(ui, "Surface", |ui| surface(ui, &mut look.settings));
+            section(ui, "Search", |ui| search(ui, &mut look, picture));
             section(ui, "Movement", |ui| {
-                let mut rate = 1000.0 / app.view.look.moving_ms;
+                let mut rate = 1000.0 / look.moving_ms;
                 let slider = Slider::new(&mut rate, 5.0..=60.0).text("pictures a second").fixed_decimals(0);
                 if ui.add(slider).on_hover_text("Higher rates are smoother, but coarser while the view moves").changed()
                 {
-                    app.view.look.moving_ms = 1000.0 / rate;
+                    look.moving_ms = 1000.0 / rate;
                 }
-                choose(ui, "two fingers", &mut app.view.look.two_fingers, &FINGERS);
+                choose(ui, "two fingers", &mut look.two_fingers, &FINGERS);
             });
         });
     });
-    app.ui.panels.focus.part(shown.response.rect);
+    if look != view.look {
+        actions.push(Action::SetLook(Box::new(look)));
+    }
+    shown.response.rect
 }
 
 fn section(ui: &mut egui::Ui, name: &str, content: impl FnOnce(&mut egui::Ui)) {
@@ -83,13 +91,10 @@ fn choose<T: PartialEq + Clone>(ui: &mut egui::Ui, label: &str, value: &mut T, o
     });
 }
 
-fn color(app: &mut App, ui: &mut egui::Ui) {
-    let fields: Vec<String> = app
-        .view
-        .shot
-        .as_ref()
+fn color(ui: &mut egui::Ui, look: &mut Look, picture: Option<&Picture>) {
+    let fields: Vec<String> = picture
         .map_or_else(Vec::new, |shot| shot.shown.cloud.fields().iter().map(|field| field.name.clone()).collect());
-    let shading = &mut app.view.look.settings.shading;
+    let shading = &mut look.settings.shading;
     let mut options = MODES.to_vec();
     for field in &fields {
         let mode = if field == "Classification" { ColorMode::Classification } else { ColorMode::Field(field.clone()) };
@@ -126,14 +131,14 @@ fn color(app: &mut App, ui: &mut egui::Ui) {
     ui.checkbox(&mut shading.legend, "Legend");
 }
 
-fn light(app: &mut App, ui: &mut egui::Ui) {
-    let shading = &mut app.view.look.settings.shading;
+fn light(ui: &mut egui::Ui, look: &mut Look, picture: Option<&Picture>) {
+    let shading = &mut look.settings.shading;
     ui.checkbox(&mut shading.lighting, "Light").on_hover_text("Otherwise colours are shown unchanged");
     ui.horizontal(|ui| {
         let mut given = shading.exposure.is_some();
         let hint = "Brightness of the points' own colours; by default only dark clouds are brightened";
         if ui.checkbox(&mut given, "exposure").on_hover_text(hint).changed() {
-            let usual = app.view.shot.as_ref().map_or(1.0, |shot| usual_exposure(&shot.shown.cloud));
+            let usual = picture.map_or(1.0, |shot| usual_exposure(&shot.shown.cloud));
             shading.exposure = given.then_some(usual);
         }
         if let Some(exposure) = &mut shading.exposure {
@@ -162,7 +167,7 @@ fn light(app: &mut App, ui: &mut egui::Ui) {
     });
 }
 
-fn surface(settings: &mut Settings, ui: &mut egui::Ui) {
+fn surface(ui: &mut egui::Ui, settings: &mut Settings) {
     let given = Settings::default().reconstruction;
     let reconstruction = &mut settings.reconstruction;
     ui.checkbox(&mut reconstruction.adaptive, "k auto")
@@ -192,12 +197,12 @@ fn surface(settings: &mut Settings, ui: &mut egui::Ui) {
     ui.checkbox(&mut reconstruction.ellipses, "Ellipses").on_hover_text("Splats follow the spread of the neighbours");
 }
 
-fn search(app: &mut App, ui: &mut egui::Ui) {
-    choose(ui, "backend", &mut app.view.look.backend, &BACKENDS);
-    let reconstruction = &mut app.view.look.settings.reconstruction;
+fn search(ui: &mut egui::Ui, look: &mut Look, picture: Option<&Picture>) {
+    choose(ui, "backend", &mut look.backend, &BACKENDS);
+    let reconstruction = &mut look.settings.reconstruction;
     let first_radius = match reconstruction.engine {
         SearchEngine::KdTree { first_radius } => first_radius,
-        _ => app.view.shot.as_ref().map_or(0.01, |shot| first_radius(&shot.shown.cloud)),
+        _ => picture.map_or(0.01, |shot| first_radius(&shot.shown.cloud)),
     };
     let engines = [
         ("screen grid", SearchEngine::ScreenGrid),

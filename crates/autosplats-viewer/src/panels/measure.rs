@@ -5,18 +5,18 @@ use std::fmt::Write as _;
 use autosplats::cloud::glam::DVec3;
 use eframe::egui;
 
-use crate::app::App;
-use crate::commands::Tool;
 use crate::measure::{Ruler, angle_text};
-use crate::tools::ruler;
+use crate::session::Session;
+use crate::view::View;
 
-pub(super) fn show(app: &mut App, context: &egui::Context) {
-    if app.ui.tool != Tool::Measure || app.ui.tools.measured.is_empty() {
+/// Shows the values of a measurement by its corners, for the tool that measures.
+pub(super) fn show(corners: &mut Vec<DVec3>, context: &egui::Context, session: &Session, view: &View) {
+    if corners.is_empty() {
         return;
     }
-    let report = Report::new(&ruler(app), &app.ui.tools.measured);
+    let report = Report::new(&session.ruler(), corners);
     let mut open = true;
-    let place = app.view.rect.right_top() + egui::vec2(-16.0, 310.0);
+    let place = view.rect.right_top() + egui::vec2(-16.0, 310.0);
     let window = egui::Window::new("Measurement")
         .open(&mut open)
         .resizable(true)
@@ -39,18 +39,18 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         ui.horizontal(|ui| {
             if ui.button("Copy").on_hover_text("As text, a line each").clicked() {
                 context.copy_text(report.text());
-                app.ui.messages.note("The measurement was copied");
+                session.messages.note("The measurement was copied");
             }
             if ui.button("Remove last").on_hover_text("The last corner (Backspace)").clicked() {
-                app.ui.tools.measured.pop();
+                corners.pop();
             }
             if ui.button("Clear").clicked() {
-                app.ui.tools.measured.clear();
+                corners.clear();
             }
         });
     });
     if !open {
-        app.ui.tools.measured.clear();
+        corners.clear();
     }
 }
 

@@ -4,71 +4,80 @@ use autosplats::ViewDirection;
 use eframe::egui;
 
 use super::command_button;
-use crate::app::App;
+use crate::action::Action;
 use crate::commands::{Command, Tool};
+use crate::look::Look;
+use crate::session::Session;
+use crate::tools::Tools;
+use crate::view::View;
 
-pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
+/// Shows the menus. Returns their place.
+pub(super) fn show(
+    ui: &mut egui::Ui,
+    session: &Session,
+    view: &View,
+    tools: &mut Tools,
+    actions: &mut Vec<Action>,
+) -> egui::Rect {
     let shown = egui::Panel::top("menu").show(ui, |ui| {
         egui::MenuBar::new().ui(ui, |ui| {
-            ui.menu_button("File", |ui| file(app, ui));
-            ui.menu_button("Edit", |ui| edit(app, ui));
-            ui.menu_button("View", |ui| view(app, ui));
-            ui.menu_button("Window", |ui| window(app, ui));
+            ui.menu_button("File", |ui| file(ui, session, actions));
+            ui.menu_button("Edit", |ui| edit(ui, session, actions));
+            ui.menu_button("View", |ui| view_menu(ui, session, view, actions));
+            ui.menu_button("Window", |ui| window(ui, view, actions));
             ui.separator();
-            tools(app, ui);
+            tool_bar(ui, tools, actions);
         });
     });
-    app.ui.panels.focus.part(shown.response.rect);
+    shown.response.rect
 }
 
-fn file(app: &mut App, ui: &mut egui::Ui) {
-    command_button(app, ui, Command::Open, true);
-    let recent = app.session.recent.clone();
-    ui.add_enabled_ui(!recent.is_empty(), |ui| {
+fn file(ui: &mut egui::Ui, session: &Session, actions: &mut Vec<Action>) {
+    command_button(ui, actions, Command::Open, true);
+    ui.add_enabled_ui(!session.recent.is_empty(), |ui| {
         ui.menu_button("Open recent", |ui| {
-            for kept in recent {
+            for kept in &session.recent {
                 if ui.button(kept.short_name()).on_hover_text(&kept.source).clicked() {
-                    app.open_again(kept);
+                    actions.push(Action::OpenAgain(kept.clone()));
                     ui.close();
                 }
             }
         });
     });
-    let any = !app.document().layers.is_empty();
+    let any = !session.document().layers.is_empty();
     ui.separator();
-    command_button(app, ui, Command::Export, any);
-    command_button(app, ui, Command::Screenshot, any);
-    command_button(app, ui, Command::Film, any);
-    command_button(app, ui, Command::SaveState, any);
+    command_button(ui, actions, Command::Export, any);
+    command_button(ui, actions, Command::Screenshot, any);
+    command_button(ui, actions, Command::Film, any);
+    command_button(ui, actions, Command::SaveState, any);
     ui.separator();
-    let open = any || !app.session.loader.jobs().is_empty() || !app.session.playing.is_empty();
-    command_button(app, ui, Command::CloseAll, open);
-    command_button(app, ui, Command::Quit, true);
+    command_button(ui, actions, Command::CloseAll, !session.is_empty());
+    command_button(ui, actions, Command::Quit, true);
 }
 
-fn edit(app: &mut App, ui: &mut egui::Ui) {
-    let steps = [app.session.history.undo_label(), app.session.history.redo_label()].map(|label| label.is_some());
-    command_button(app, ui, Command::Undo, steps[0]);
-    command_button(app, ui, Command::Redo, steps[1]);
+fn edit(ui: &mut egui::Ui, session: &Session, actions: &mut Vec<Action>) {
+    let steps = [session.history.undo_label(), session.history.redo_label()].map(|label| label.is_some());
+    command_button(ui, actions, Command::Undo, steps[0]);
+    command_button(ui, actions, Command::Redo, steps[1]);
     ui.separator();
-    let counts = app.counts().all;
+    let counts = session.counts().all;
     let any = counts.points > 0;
-    command_button(app, ui, Command::SelectAll, any);
-    command_button(app, ui, Command::SelectNone, counts.selected > 0);
-    command_button(app, ui, Command::InvertSelection, any);
+    command_button(ui, actions, Command::SelectAll, any);
+    command_button(ui, actions, Command::SelectNone, counts.selected > 0);
+    command_button(ui, actions, Command::InvertSelection, any);
     ui.separator();
-    command_button(app, ui, Command::HideSelected, counts.selected > 0);
-    command_button(app, ui, Command::ShowAll, counts.hidden > 0);
-    command_button(app, ui, Command::DeleteSelected, counts.selected > 0);
-    command_button(app, ui, Command::CropToSelected, counts.selected > 0);
+    command_button(ui, actions, Command::HideSelected, counts.selected > 0);
+    command_button(ui, actions, Command::ShowAll, counts.hidden > 0);
+    command_button(ui, actions, Command::DeleteSelected, counts.selected > 0);
+    command_button(ui, actions, Command::CropToSelected, counts.selected > 0);
     ui.separator();
-    command_button(app, ui, Command::Clip, any);
+    command_button(ui, actions, Command::Clip, any);
 }
 
-fn view(app: &mut App, ui: &mut egui::Ui) {
-    let any = !app.document().layers.is_empty();
-    command_button(app, ui, Command::FitAll, any);
-    command_button(app, ui, Command::FitSelected, any);
+fn view_menu(ui: &mut egui::Ui, session: &Session, view: &View, actions: &mut Vec<Action>) {
+    let any = !session.document().layers.is_empty();
+    command_button(ui, actions, Command::FitAll, any);
+    command_button(ui, actions, Command::FitSelected, any);
     ui.separator();
     for direction in [
         ViewDirection::Front,
@@ -80,48 +89,51 @@ fn view(app: &mut App, ui: &mut egui::Ui) {
         ViewDirection::Iso,
         ViewDirection::Auto,
     ] {
-        command_button(app, ui, Command::View(direction), any);
+        command_button(ui, actions, Command::View(direction), any);
     }
-    command_button(app, ui, Command::OppositeView, any);
+    command_button(ui, actions, Command::OppositeView, any);
     ui.separator();
-    command_button(app, ui, Command::Projection, true);
+    command_button(ui, actions, Command::Projection, true);
     ui.horizontal(|ui| {
-        let mut fov = app.view.navigation.fov_deg();
+        let mut fov = view.navigation.fov_deg();
         let number = egui::DragValue::new(&mut fov).range(5.0..=120.0).max_decimals(1).suffix("°");
         if ui
             .add(number)
             .on_hover_text("Vertical field of view; the surroundings of the pivot keep their size")
             .changed()
         {
-            app.view.navigation.set_fov_deg(fov);
+            actions.push(Action::SetFov(fov));
         }
         ui.label("Field of view");
     });
-    command_button(app, ui, Command::UpAxis, any);
-    command_button(app, ui, Command::Level, any);
+    command_button(ui, actions, Command::UpAxis, any);
+    command_button(ui, actions, Command::Level, any);
     ui.separator();
-    command_button(app, ui, Command::CopyView, any);
-    command_button(app, ui, Command::PasteView, true);
+    command_button(ui, actions, Command::CopyView, any);
+    command_button(ui, actions, Command::PasteView, true);
     ui.separator();
-    command_button(app, ui, Command::Dots, any);
+    command_button(ui, actions, Command::Dots, any);
     ui.separator();
-    let [moves, timeline] = [!app.session.playing.is_empty(), app.session.playing.has_timeline()];
-    command_button(app, ui, Command::Play, moves);
+    let [moves, timeline] = [!session.playing.is_empty(), session.playing.has_timeline()];
+    command_button(ui, actions, Command::Play, moves);
     for command in [Command::StepBack, Command::StepForward, Command::PlayFromHere, Command::PlayToHere] {
-        command_button(app, ui, command, timeline);
+        command_button(ui, actions, command, timeline);
     }
 }
 
-fn window(app: &mut App, ui: &mut egui::Ui) {
+fn window(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     for command in [Command::Inputs, Command::Look, Command::Statistics, Command::Help] {
-        command_button(app, ui, command, true);
+        command_button(ui, actions, command, true);
     }
     ui.separator();
     for command in [Command::NextPart, Command::PreviousPart] {
-        command_button(app, ui, command, true);
+        command_button(ui, actions, command, true);
     }
     ui.separator();
-    ui.checkbox(&mut app.view.look.overlay, "Axes and scale bar");
+    let mut overlay = view.look.overlay;
+    if ui.checkbox(&mut overlay, "Axes and scale bar").changed() {
+        actions.push(Action::SetLook(Box::new(Look { overlay, ..view.look.clone() })));
+    }
     ui.separator();
     let mut theme = ui.ctx().options(|options| options.theme_preference);
     let themes = [
@@ -136,21 +148,21 @@ fn window(app: &mut App, ui: &mut egui::Ui) {
     }
 }
 
-fn tools(app: &mut App, ui: &mut egui::Ui) {
+fn tool_bar(ui: &mut egui::Ui, tools: &mut Tools, actions: &mut Vec<Action>) {
     let context = ui.ctx().clone();
     for tool in Tool::ALL {
         let command = Command::Tool(tool);
         let tooltip = format!("{} ({})", command.tooltip(), command.key(&context));
-        if ui.selectable_label(app.ui.tool == tool, tool.name()).on_hover_text(tooltip).clicked() {
-            crate::keys::run(app, &context, command);
+        if ui.selectable_label(tools.current == tool, tool.name()).on_hover_text(tooltip).clicked() {
+            actions.push(command.into());
         }
     }
-    if app.ui.tool.selects() {
+    if tools.current.selects() {
         ui.separator();
-        ui.checkbox(&mut app.ui.tools.through, "Through").on_hover_text("Also select points behind the surface");
+        ui.checkbox(&mut tools.through, "Through").on_hover_text("Also select points behind the surface");
     }
-    if app.ui.tool == Tool::Brush {
-        let radius = egui::DragValue::new(&mut app.ui.tools.brush).range(2.0..=300.0).suffix(" px");
+    if tools.current == Tool::Brush {
+        let radius = egui::DragValue::new(&mut tools.brush).range(2.0..=300.0).suffix(" px");
         ui.add(radius).on_hover_text("Radius of the brush");
     }
 }

@@ -5,9 +5,10 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 
 use eframe::egui;
 
-use crate::app::App;
+use crate::action::Action;
 use crate::files::ask_for_inputs;
 use crate::loading::Input;
+use crate::messages::MessageSender;
 
 #[derive(Default)]
 pub(crate) struct Dialogs {
@@ -22,50 +23,51 @@ impl Dialogs {
             self.chosen = Some(ask_for_inputs(context));
         }
     }
-}
 
-pub(super) fn show(app: &mut App, context: &egui::Context) {
-    match app.ui.panels.dialogs.chosen.as_ref().map(Receiver::try_recv) {
-        // Without a system dialog, the text field is shown.
-        Some(Ok(None)) => {
-            app.ui.panels.dialogs.chosen = None;
-            app.ui.panels.dialogs.typed.get_or_insert_default();
-        }
-        Some(Ok(Some(paths))) => {
-            app.ui.panels.dialogs.chosen = None;
-            paths.into_iter().for_each(|path| app.open(Input::file(path)));
-        }
-        Some(Err(TryRecvError::Disconnected)) => app.ui.panels.dialogs.chosen = None,
-        Some(Err(TryRecvError::Empty)) | None => {}
-    }
-    let Some(typed) = &mut app.ui.panels.dialogs.typed else { return };
-    let mut input = None;
-    let mut closed = false;
-    let modal = egui::Modal::new(egui::Id::unique("open")).show(context, |ui| {
-        ui.set_width(420.0);
-        ui.label("Path of a file, or a scene such as scene:statue");
-        let line = ui.add(egui::TextEdit::singleline(typed).desired_width(f32::INFINITY).hint_text("scan.laz"));
-        let enter = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-        if !enter {
-            line.request_focus();
-        }
-        ui.horizontal(|ui| {
-            if (ui.button("Open").clicked() || enter) && !typed.trim().is_empty() {
-                input = Some(typed.trim().to_owned());
+    /// Receives the choice in the system's dialog, or shows the text field.
+    pub(super) fn show(&mut self, context: &egui::Context, messages: &MessageSender, actions: &mut Vec<Action>) {
+        match self.chosen.as_ref().map(Receiver::try_recv) {
+            // Without a system dialog, the text field is shown.
+            Some(Ok(None)) => {
+                self.chosen = None;
+                self.typed.get_or_insert_default();
             }
-            closed = ui.button("Cancel").clicked();
+            Some(Ok(Some(paths))) => {
+                self.chosen = None;
+                paths.into_iter().for_each(|path| actions.push(Action::Open(Input::file(path))));
+            }
+            Some(Err(TryRecvError::Disconnected)) => self.chosen = None,
+            Some(Err(TryRecvError::Empty)) | None => {}
+        }
+        let Some(typed) = &mut self.typed else { return };
+        let mut input = None;
+        let mut closed = false;
+        let modal = egui::Modal::new(egui::Id::unique("open")).show(context, |ui| {
+            ui.set_width(420.0);
+            ui.label("Path of a file, or a scene such as scene:statue");
+            let line = ui.add(egui::TextEdit::singleline(typed).desired_width(f32::INFINITY).hint_text("scan.laz"));
+            let enter = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+            if !enter {
+                line.request_focus();
+            }
+            ui.horizontal(|ui| {
+                if (ui.button("Open").clicked() || enter) && !typed.trim().is_empty() {
+                    input = Some(typed.trim().to_owned());
+                }
+                closed = ui.button("Cancel").clicked();
+            });
         });
-    });
-    if let Some(name) = input {
-        match Input::parse(&name) {
-            Ok(input) => {
-                app.open(input);
-                closed = true;
+        if let Some(name) = input {
+            match Input::parse(&name) {
+                Ok(input) => {
+                    actions.push(Action::Open(input));
+                    closed = true;
+                }
+                Err(error) => messages.error(error.to_string()),
             }
-            Err(error) => app.ui.messages.error(error.to_string()),
         }
-    }
-    if closed || modal.should_close() {
-        app.ui.panels.dialogs.typed = None;
+        if closed || modal.should_close() {
+            self.typed = None;
+        }
     }
 }

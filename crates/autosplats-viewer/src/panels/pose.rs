@@ -3,8 +3,10 @@
 use autosplats::cloud::glam::{DMat3, DMat4, DQuat, DVec3, EulerRot};
 use eframe::egui;
 
-use crate::app::App;
-use crate::document::LayerId;
+use crate::action::Action;
+use crate::document::{Layer, LayerId, can_place};
+use crate::session::Session;
+use crate::view::View;
 
 /// The pose that is being edited.
 pub(crate) struct Pose {
@@ -57,28 +59,36 @@ impl Parts {
     }
 }
 
-/// Opens the window for an input's pose.
-pub(super) fn open(app: &mut App, id: LayerId) {
-    let Some(layer) = app.document().layer(id) else { return };
-    let middle = layer.bounds().map_or(DVec3::ZERO, |[low, high]| low.midpoint(high));
-    let middle = layer.pose.inverse().transform_point3(middle);
-    let parts = Parts::new(&layer.pose, middle);
-    app.ui.panels.pose = Some(Pose { layer: id, middle, parts, made: layer.pose, before: None });
+impl Pose {
+    /// The pose of an input, to be edited.
+    pub(crate) fn of(layer: &Layer) -> Self {
+        let middle = layer.bounds().map_or(DVec3::ZERO, |[low, high]| low.midpoint(high));
+        let middle = layer.pose.inverse().transform_point3(middle);
+        let parts = Parts::new(&layer.pose, middle);
+        Self { layer: layer.id, middle, parts, made: layer.pose, before: None }
+    }
 }
 
-pub(super) fn show(app: &mut App, context: &egui::Context) {
-    let Some(mut pose) = app.ui.panels.pose.take() else { return };
-    let Some(layer) = app.document().layer(pose.layer) else { return };
-    let (name, opened_at) = (layer.name.clone(), layer.opened_at);
+/// Shows the window, while a pose is edited.
+pub(super) fn show(
+    edited: &mut Option<Pose>,
+    context: &egui::Context,
+    session: &Session,
+    view: &View,
+    actions: &mut Vec<Action>,
+) {
+    let Some(mut pose) = edited.take() else { return };
+    let Some(layer) = session.document().layer(pose.layer) else { return };
+    let (name, opened_at) = (&layer.name, layer.opened_at);
     if layer.pose != pose.made {
         (pose.parts, pose.made) = (Parts::new(&layer.pose, pose.middle), layer.pose);
     }
     let mut open = true;
     let mut busy = false;
-    let speed = (app.view.navigation.height_at_pivot() * 1e-3).max(1e-9);
+    let speed = (view.navigation.height_at_pivot() * 1e-3).max(1e-9);
     let mut wanted = None;
     let window = egui::Window::new(format!("Place of {name}")).id(egui::Id::unique("pose"));
-    let window = window.open(&mut open).resizable(false).default_pos(app.view.rect.left_top() + egui::vec2(16.0, 16.0));
+    let window = window.open(&mut open).resizable(false).default_pos(view.rect.left_top() + egui::vec2(16.0, 16.0));
     window.show(context, |ui| {
         let mut parts = pose.parts;
         busy = numbers(ui, &mut parts, speed);
@@ -100,16 +110,18 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             }
         });
     });
-    if let Some(wanted) = wanted.filter(|wanted| *wanted != pose.made)
-        && app.change(|document| document.set_pose(pose.layer, wanted))
-    {
+    if let Some(wanted) = wanted.filter(|wanted| *wanted != pose.made && can_place(wanted)) {
+        actions.push(Action::PreviewPose { layer: pose.layer, pose: wanted });
         pose.before.get_or_insert(pose.made);
         pose.made = wanted;
     }
-    if !busy || !open {
-        settle(app, &mut pose);
+    // All changes since the last time become one undo step.
+    if (!busy || !open)
+        && let Some(before) = pose.before.take().filter(|before| *before != pose.made)
+    {
+        actions.push(Action::SettlePose { layer: pose.layer, before, made: pose.made });
     }
-    app.ui.panels.pose = open.then_some(pose);
+    *edited = open.then_some(pose);
 }
 
 /// Shows the numbers. Returns whether one of them is being dragged or typed.
@@ -141,17 +153,6 @@ fn numbers(ui: &mut egui::Ui, parts: &mut Parts, speed: f64) -> bool {
     });
     ui.small("Turned about its middle: about x, then y, then z.");
     busy
-}
-
-/// Combines all changes since the last call into one undo step.
-fn settle(app: &mut App, pose: &mut Pose) {
-    let Some(before) = pose.before.take().filter(|before| *before != pose.made) else { return };
-    let (id, made) = (pose.layer, pose.made);
-    app.change(|document| document.set_pose(id, before));
-    app.edit("Place an input", |document| {
-        document.set_pose(id, made);
-    });
-    app.measure_scene();
 }
 
 /// A matrix, row by row.

@@ -4,8 +4,8 @@ use autosplats::Timings;
 use eframe::egui;
 use egui_plot::{Bar, BarChart, Plot};
 
-use crate::app::App;
 use crate::document::grouped;
+use crate::view::View;
 
 /// Name, milliseconds and colour of a stage.
 type Stage = (&'static str, fn(&Timings) -> f64, egui::Color32);
@@ -20,10 +20,9 @@ const STAGES: [Stage; 6] = [
     ("shade", |t| t.shade, egui::Color32::from_rgb(86, 180, 233)),
 ];
 
-pub(super) fn show(app: &mut App, context: &egui::Context) {
-    let mut open = app.ui.panels.statistics;
-    let place = app.view.rect.left_bottom() + egui::vec2(10.0, -320.0);
-    let window = egui::Window::new("Statistics").open(&mut open).default_pos(place).default_width(330.0);
+pub(super) fn show(open: &mut bool, context: &egui::Context, view: &View) {
+    let place = view.rect.left_bottom() + egui::vec2(10.0, -320.0);
+    let window = egui::Window::new("Statistics").open(open).default_pos(place).default_width(330.0);
     window.show(context, |ui| {
         Plot::new("stages")
             .height(120.0)
@@ -35,9 +34,9 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             .include_y(0.0)
             .y_axis_label("ms")
             .show(ui, |plot| {
-                let mut below: Vec<f64> = vec![0.0; app.view.rate.timings.len()];
+                let mut below: Vec<f64> = vec![0.0; view.rate.timings.len()];
                 for (name, value, color) in STAGES {
-                    let bars = app.view.rate.timings.iter().zip(&mut below).enumerate().map(|(x, (timings, below))| {
+                    let bars = view.rate.timings.iter().zip(&mut below).enumerate().map(|(x, (timings, below))| {
                         let value = value(timings);
                         let bar = Bar::new(x as f64, value).base_offset(*below).width(1.0).fill(color);
                         *below += value;
@@ -46,7 +45,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
                     plot.bar_chart(BarChart::new(name, bars.collect()).color(color));
                 }
             });
-        let Some(picture) = &app.view.shot else { return };
+        let Some(picture) = &view.shot else { return };
         egui::Grid::new("timings").num_columns(4).striped(true).show(ui, |ui| {
             for pair in STAGES.chunks(2) {
                 for (name, value, color) in pair {
@@ -76,5 +75,4 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             grouped(counts.covered)
         ));
     });
-    app.ui.panels.statistics = open;
 }

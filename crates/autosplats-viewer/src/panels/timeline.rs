@@ -2,38 +2,43 @@
 
 use eframe::egui;
 
-use crate::app::App;
+use crate::action::Action;
 use crate::commands::Command;
-use crate::playing::SPEEDS;
+use crate::playing::{Clock, Playing, SPEEDS};
 
-pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
-    if app.session.playing.is_empty() {
-        return;
+/// Shows the timeline, if something plays. Returns its place.
+pub(super) fn show(ui: &mut egui::Ui, playing: &Playing, actions: &mut Vec<Action>) -> Option<egui::Rect> {
+    if playing.is_empty() {
+        return None;
     }
+    let mut clock = playing.clock.clone();
     let shown = egui::Panel::bottom("timeline").show(ui, |ui| {
         ui.add_space(2.0);
         ui.horizontal(|ui| {
-            let timeline = app.session.playing.has_timeline();
+            let timeline = playing.has_timeline();
             if timeline {
-                button(app, ui, Command::StepBack, ButtonSymbol::Back);
+                button(ui, actions, Command::StepBack, ButtonSymbol::Back);
             }
-            let sign = if app.session.playing.clock.playing { ButtonSymbol::Pause } else { ButtonSymbol::Play };
-            button(app, ui, Command::Play, sign);
+            let sign = if clock.playing { ButtonSymbol::Pause } else { ButtonSymbol::Play };
+            button(ui, actions, Command::Play, sign);
             if timeline {
-                button(app, ui, Command::StepForward, ButtonSymbol::Forward);
+                button(ui, actions, Command::StepForward, ButtonSymbol::Forward);
             }
             // From the right: the small controls, then the time slider in the remaining space.
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                statistics(app, ui);
+                statistics(ui, playing);
                 if timeline {
-                    speed(app, ui);
-                    times(app, ui);
+                    speed(ui, &mut clock);
+                    times(ui, playing, &mut clock);
                 }
             });
         });
         ui.add_space(2.0);
     });
-    app.ui.panels.focus.part(shown.response.rect);
+    if clock != playing.clock {
+        actions.push(Action::SetClock(clock));
+    }
+    Some(shown.response.rect)
 }
 
 /// A symbol drawn on a button, since the fonts have no such glyphs.
@@ -72,26 +77,25 @@ impl ButtonSymbol {
     }
 }
 
-fn button(app: &mut App, ui: &mut egui::Ui, command: Command, sign: ButtonSymbol) {
+fn button(ui: &mut egui::Ui, actions: &mut Vec<Action>, command: Command, sign: ButtonSymbol) {
     let tip = format!("{} ({})", command.tooltip(), command.key(ui.ctx()));
     let response = ui.add(egui::Button::new("").min_size(egui::vec2(30.0, 0.0))).on_hover_text(tip);
     sign.draw(ui.painter(), response.rect.center(), ui.style().interact(&response).fg_stroke.color);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, command.label()));
     if response.clicked() {
-        let context = ui.ctx().clone();
-        crate::keys::run(app, &context, command);
+        actions.push(command.into());
     }
 }
 
 /// Counts of live updates.
-fn statistics(app: &App, ui: &mut egui::Ui) {
-    let statistics = app.session.playing.statistics();
+fn statistics(ui: &mut egui::Ui, playing: &Playing) {
+    let statistics = playing.statistics();
     if statistics.refused > 0 {
         let why = statistics.last_refusal.unwrap_or_default();
         let text = format!("{} refused", statistics.refused);
         ui.colored_label(ui.visuals().warn_fg_color, text).on_hover_text(why);
     }
-    if app.session.playing.is_live() {
+    if playing.is_live() {
         if statistics.dropped > 0 {
             ui.weak(format!("{} dropped", statistics.dropped))
                 .on_hover_text("Replaced by newer points before they were shown");
@@ -104,8 +108,7 @@ fn statistics(app: &App, ui: &mut egui::Ui) {
     }
 }
 
-fn speed(app: &mut App, ui: &mut egui::Ui) {
-    let clock = &mut app.session.playing.clock;
+fn speed(ui: &mut egui::Ui, clock: &mut Clock) {
     ui.checkbox(&mut clock.looped, "Loop").on_hover_text("Start again at the end");
     let number = egui::DragValue::new(&mut clock.speed).range(SPEEDS).speed(0.01).max_decimals(2).suffix("×");
     let response = ui.add(number).on_hover_text("Seconds played per second");
@@ -119,10 +122,8 @@ fn speed(app: &mut App, ui: &mut egui::Ui) {
     }
 }
 
-fn times(app: &mut App, ui: &mut egui::Ui) {
-    let frame =
-        app.session.playing.frame().map(|(frame, frames)| format!("  frame {frame} of {frames}")).unwrap_or_default();
-    let clock = &mut app.session.playing.clock;
+fn times(ui: &mut egui::Ui, playing: &Playing, clock: &mut Clock) {
+    let frame = playing.frame().map(|(frame, frames)| format!("  frame {frame} of {frames}")).unwrap_or_default();
     let (mut position, length) = (clock.position(), clock.length());
     ui.monospace(format!("{position:.2} / {length:.2} s{frame}"));
     ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(60.0);

@@ -4,59 +4,48 @@ use std::sync::Arc;
 
 use autosplats::cloud::PointCloud;
 use autosplats_sources::Source;
-use eframe::egui;
 
 use super::thread::StreamThread;
 use super::{PlayingInput, RemovedInput};
-use crate::app::App;
-use crate::document::{Layer, LayerId};
+use crate::document::LayerId;
 use crate::glance::FirstLook;
 use crate::loading::{Appearance, Input};
+use crate::session::Session;
 
-impl App {
+impl Session {
     /// Starts to play an input.
-    pub(crate) fn play(&mut self, input: Input, appearance: Appearance, context: &egui::Context) {
-        let thread = StreamThread::start(input.clone(), self.session.loader.frame.clone(), context.clone());
-        self.session.playing.streams.push(PlayingInput::new(input, thread, appearance));
+    pub(crate) fn play(&mut self, input: Input, appearance: Appearance) {
+        let thread = StreamThread::start(input.clone(), self.loader.frame.clone(), self.loader.context().clone());
+        self.playing.streams.push(PlayingInput::new(input, thread, appearance));
     }
 
     /// Opens the source of a layer again and plays it from the clock's position.
     pub(crate) fn play_anew(&mut self, id: LayerId, input: Input) {
         if matches!(input.source, Source::StandardInput) {
-            self.ui.messages.note(format!("{}: an input from a pipe cannot be read again", input.name));
+            self.messages.note(format!("{}: an input from a pipe cannot be read again", input.name));
             return;
         }
-        self.ui.messages.note(format!("{} is opened again", input.name));
-        let thread = StreamThread::start(
-            input.clone(),
-            self.session.loader.frame.clone(),
-            self.session.loader.context().clone(),
-        );
-        match self.session.playing.streams.iter_mut().find(|moving| moving.layer == Some(id)) {
+        self.messages.note(format!("{} is opened again", input.name));
+        let thread = StreamThread::start(input.clone(), self.loader.frame.clone(), self.loader.context().clone());
+        match self.playing.streams.iter_mut().find(|moving| moving.layer == Some(id)) {
             Some(moving) => (moving.thread, moving.frame) = (thread, None),
             None => {
                 let moving = PlayingInput::new(input, thread, Appearance::default());
-                self.session.playing.streams.push(PlayingInput { layer: Some(id), ..moving });
+                self.playing.streams.push(PlayingInput { layer: Some(id), ..moving });
             }
         }
-        self.session.playing.clock.hold();
+        self.playing.clock.hold();
     }
 
-    /// Starts or stops playback.
-    pub(crate) fn toggle_playing(&mut self) {
-        self.session.playing.clock.toggle();
-    }
-
-    /// Advances the clock, requests the frames of the new time and receives points.
-    pub(crate) fn follow_streams(&mut self, context: &egui::Context) {
-        self.follow_layers(context);
-        if self.session.playing.is_empty() {
+    /// Advances the clock to window time `now`, seconds, requests the frames of the new time and receives points.
+    pub(crate) fn follow_streams(&mut self, now: f64) {
+        self.follow_layers();
+        if self.playing.is_empty() {
             return;
         }
-        let now = context.input(|input| input.time);
-        let passed = self.session.playing.time.replace(now).map_or(0.0, |before| now - before);
+        let passed = self.playing.time.replace(now).map_or(0.0, |before| now - before);
         self.keep_edits();
-        let playing = &mut self.session.playing;
+        let playing = &mut self.playing;
         playing.count_updates(now);
         let open = playing.streams.iter().all(|moving| moving.thread.timeline().is_some());
         if open || !playing.clock.is_held() {
@@ -75,61 +64,61 @@ impl App {
             }
         }
         self.take_news();
-        if self.session.playing.clock.runs() && self.session.playing.timelines().any(|(timeline, _)| timeline.len() > 1)
-        {
-            context.request_repaint();
+        if self.playing.clock.runs() && self.playing.timelines().any(|(timeline, _)| timeline.len() > 1) {
+            self.loader.context().request_repaint();
         }
     }
 
     /// Stops the streams of removed layers, and restarts those of layers that undo has brought back. A restored layer
     /// is at the clock's time; if it has unsaved edits, the clock returns to their time.
-    fn follow_layers(&mut self, context: &egui::Context) {
+    fn follow_layers(&mut self) {
         let open: Vec<LayerId> = self.document().layers.iter().map(|layer| layer.id).collect();
-        let position = self.session.playing.clock.position();
+        let position = self.playing.clock.position();
         let mut index = 0;
-        while let Some(moving) = self.session.playing.streams.get(index) {
+        while let Some(moving) = self.playing.streams.get(index) {
             match moving.layer.filter(|id| !open.contains(id)) {
                 None => index += 1,
                 Some(layer) => {
-                    let PlayingInput { input, frame, .. } = self.session.playing.streams.remove(index);
-                    self.session.playing.removed.push(RemovedInput { input, layer, frame, position });
+                    let PlayingInput { input, frame, .. } = self.playing.streams.remove(index);
+                    self.playing.removed.push(RemovedInput { input, layer, frame, position });
                 }
             }
         }
-        if self.session.playing.removed.is_empty() {
+        if self.playing.removed.is_empty() {
             return;
         }
-        let removed = std::mem::take(&mut self.session.playing.removed);
+        let removed = std::mem::take(&mut self.playing.removed);
         let (back, gone): (Vec<_>, Vec<_>) = removed.into_iter().partition(|removed| open.contains(&removed.layer));
-        self.session.playing.removed = gone;
-        self.session.playing.removed.retain(|removed| self.session.history.holds(removed.layer));
+        self.playing.removed = gone;
+        self.playing.removed.retain(|removed| self.history.holds(removed.layer));
         for RemovedInput { input, layer, frame, position } in back {
             // A pipe cannot be read again.
             if matches!(input.source, Source::StandardInput) {
-                self.ui.messages.note(format!("{} was closed; its last points are shown", input.name));
+                self.messages.note(format!("{} was closed; its last points are shown", input.name));
                 continue;
             }
-            if self.session.history.is_unsaved(layer) {
-                self.session.playing.edited_at.get_or_insert(position);
+            if self.history.is_unsaved(layer) {
+                self.playing.edited_at.get_or_insert(position);
             }
-            let thread = StreamThread::go_on(input.clone(), frame, self.session.loader.frame.clone(), context.clone());
+            let thread =
+                StreamThread::go_on(input.clone(), frame, self.loader.frame.clone(), self.loader.context().clone());
             let moving = PlayingInput::new(input, thread, Appearance::default());
-            self.session.playing.streams.push(PlayingInput { layer: Some(layer), frame, ..moving });
-            self.session.playing.clock.hold();
+            self.playing.streams.push(PlayingInput { layer: Some(layer), frame, ..moving });
+            self.playing.clock.hold();
         }
     }
 
     /// Receives news of the streams.
     fn take_news(&mut self) {
-        let news: Vec<_> = self.session.playing.streams.iter().map(|moving| moving.thread.news()).collect();
+        let news: Vec<_> = self.playing.streams.iter().map(|moving| moving.thread.news()).collect();
         let mut ended = Vec::new();
         for (number, news) in news.into_iter().enumerate() {
-            let name = self.session.playing.streams[number].input.name.clone();
-            news.notes.into_iter().for_each(|note| self.ui.messages.note(format!("{name}: {note}")));
+            let name = self.playing.streams[number].input.name.clone();
+            news.notes.into_iter().for_each(|note| self.messages.note(format!("{name}: {note}")));
             if let Some(ending) = news.ending {
                 match ending {
-                    Ok(()) => self.ui.messages.note(format!("{name} has ended")),
-                    Err(failure) => self.ui.messages.error(failure),
+                    Ok(()) => self.messages.note(format!("{name} has ended")),
+                    Err(failure) => self.messages.error(failure),
                 }
                 ended.push(number);
             }
@@ -138,7 +127,7 @@ impl App {
             }
         }
         for number in ended.into_iter().rev() {
-            let moving = self.session.playing.streams.remove(number);
+            let moving = self.playing.streams.remove(number);
             match moving.layer {
                 // The last points stay as an ordinary layer.
                 Some(id) => self.settle(|document| document.complete(id)),
@@ -150,22 +139,20 @@ impl App {
     /// Keeps the clock at the time of unsaved edits, since another frame would replace the edited points. Points of a
     /// stopped clock can be edited.
     fn keep_edits(&mut self) {
-        let layers: Vec<LayerId> = self.session.playing.streams.iter().filter_map(|moving| moving.layer).collect();
-        let unsaved = layers.iter().find(|id| self.session.history.is_unsaved(**id)).copied();
-        let position = self.session.playing.clock.position();
-        let edited_at = unsaved.map(|_| self.session.playing.edited_at.unwrap_or(position));
-        self.session.playing.edited_at = edited_at;
-        let moves = self.session.playing.clock.playing || edited_at.is_some_and(|at| at != position);
+        let layers: Vec<LayerId> = self.playing.streams.iter().filter_map(|moving| moving.layer).collect();
+        let unsaved = layers.iter().find(|id| self.history.is_unsaved(**id)).copied();
+        let position = self.playing.clock.position();
+        let edited_at = unsaved.map(|_| self.playing.edited_at.unwrap_or(position));
+        self.playing.edited_at = edited_at;
+        let moves = self.playing.clock.playing || edited_at.is_some_and(|at| at != position);
         if let (Some(id), Some(at)) = (unsaved.filter(|_| moves), edited_at) {
-            self.session.playing.clock.playing = false;
-            self.session.playing.clock.seek(at);
-            self.session.playing.edited_at = Some(self.session.playing.clock.position());
+            self.playing.clock.playing = false;
+            self.playing.clock.seek(at);
+            self.playing.edited_at = Some(self.playing.clock.position());
             let name = self.document().layer(id).map(|layer| layer.name.clone()).unwrap_or_default();
-            self.ui
-                .messages
-                .note(format!("{name} has edits that are not saved; export or undo them to continue playing"));
+            self.messages.note(format!("{name} has edits that are not saved; export or undo them to continue playing"));
         }
-        let still = !self.session.playing.clock.playing;
+        let still = !self.playing.clock.playing;
         let changed = |id: &LayerId| self.document().layer(*id).is_some_and(|layer| layer.incomplete == still);
         if layers.iter().any(changed) {
             self.settle(|document| layers.iter().for_each(|&id| document.set_incomplete(id, !still)));
@@ -174,25 +161,22 @@ impl App {
 
     /// Shows the points of a stream.
     fn show_frame(&mut self, number: usize, frame: Option<usize>, cloud: &Arc<PointCloud>, glance: Option<FirstLook>) {
-        let moving = &self.session.playing.streams[number];
+        let moving = &self.playing.streams[number];
         match moving.layer {
             // These points were requested before the edit.
-            Some(id) if self.session.history.is_unsaved(id) => return,
+            Some(id) if self.history.is_unsaved(id) => return,
             Some(id) => self.fill(id, cloud),
             None if cloud.is_empty() => return,
             None => {
-                let known = || FirstLook::of(&moving.input, cloud, self.frame());
+                let known = || FirstLook::of(&moving.input, cloud, self.loader.frame.get());
                 let glance = glance.unwrap_or_else(known);
                 let PlayingInput { input, appearance, .. } = moving;
                 let (input, appearance) = (input.clone(), *appearance);
-                let path = input.source.path().map(std::path::Path::to_path_buf);
-                let mut layer = Layer::new(&*input.name, path, Arc::clone(cloud)).opened_at(input.world_from_input);
-                layer.incomplete = self.session.playing.clock.playing;
-                Appearance { visible: layer.visible, tint: layer.tint } = appearance;
-                let id = self.add_layer(layer, &input, glance);
-                self.session.playing.streams[number].layer = Some(id);
+                let id = self.add_layer(&input, cloud, appearance, self.playing.clock.playing);
+                self.examined(id, glance);
+                self.playing.streams[number].layer = Some(id);
             }
         }
-        self.session.playing.streams[number].frame = frame;
+        self.playing.streams[number].frame = frame;
     }
 }

@@ -15,7 +15,6 @@ use autosplats_sources::{Statistics, Timeline, beginnings};
 pub(crate) use self::clock::{Clock, SPEEDS};
 pub(crate) use self::reel::{Reel, Track};
 use self::thread::StreamThread;
-use crate::app::App;
 use crate::document::LayerId;
 use crate::loading::{Appearance, Input};
 
@@ -155,7 +154,7 @@ impl Playing {
 
     /// Whether an input of this name is playing.
     pub(crate) fn has(&self, name: &str) -> bool {
-        self.streams.iter().any(|moving| App::source_name(&moving.input) == name)
+        self.streams.iter().any(|moving| moving.input.source_name() == name)
     }
 
     /// Whether a layer belongs to a playing input.

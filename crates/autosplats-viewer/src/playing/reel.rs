@@ -97,7 +97,7 @@ impl Progress for Follower<'_> {
     }
 
     fn note(&self, note: &str) {
-        self.mail.send(Ok(format!("{}: {note}", self.input.name)));
+        self.mail.note(format!("{}: {note}", self.input.name));
     }
 }
 

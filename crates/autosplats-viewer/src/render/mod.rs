@@ -24,7 +24,7 @@ use autosplats::{AdapterSummary, Backend, Camera, Counts, Image, Settings, Timin
 use eframe::egui;
 
 pub(crate) use self::depths::Depths;
-pub(crate) use self::task::{Outcome, PickHit, Purpose, Task};
+pub(crate) use self::task::{Goal, Outcome, PickHit, Purpose, Task};
 use crate::document::{Document, ShownCloud};
 
 /// A request for a picture.

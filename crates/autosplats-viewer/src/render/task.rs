@@ -1,5 +1,6 @@
 //! Tasks: work that the render thread does in order, besides pictures.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use autosplats::Image;
@@ -7,7 +8,6 @@ use autosplats::cloud::glam::DVec3;
 
 use super::RenderRequest;
 use crate::document::{Region, SelectMode, ShownCloud};
-use crate::output::Goal;
 
 impl RenderRequest {
     /// The same request, for finding points: splats instead of dots. Where dots are shown, all points are visible; so
@@ -51,6 +51,14 @@ pub(crate) enum Task {
     Select { wish: Box<RenderRequest>, region: Region, through: bool, mode: SelectMode },
     /// Renders a picture of any size and hands it over.
     Photograph { wish: Box<RenderRequest>, goal: Goal },
+}
+
+/// What a rendered picture is for.
+pub(crate) enum Goal {
+    /// A file.
+    File(PathBuf),
+    /// A picture of the film with this number.
+    Film(u64),
 }
 
 /// What a point is picked for.

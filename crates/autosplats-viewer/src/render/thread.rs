@@ -12,10 +12,9 @@ use autosplats::{
 use rayon::prelude::*;
 
 use super::pace::{Costs, Reduction};
-use super::task::{Outcome, PickHit, enlarge};
+use super::task::{Goal, Outcome, PickHit, enlarge};
 use super::{Answer, Depths, Outbox, Picture, RenderRequest, Shared, Task};
 use crate::document::{Document, LayerId, ShownCloud};
-use crate::output::Goal;
 
 /// Colour that selected points are mixed with, sRGB.
 const SELECTION_COLOR: [u16; 3] = [255, 140, 20];

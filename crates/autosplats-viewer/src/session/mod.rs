@@ -1,71 +1,116 @@
-//! The session: what is open, and how it is edited, read and played. It knows no camera and no window.
+//! The session: what is open, and how it is edited, read and played. It knows no camera and draws nothing.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
 
 use autosplats::cloud::Axes;
+use autosplats::cloud::glam::DVec3;
 use eframe::egui;
 
-use crate::document::{History, LayerId};
+use crate::document::{ClipBox, History, LayerId};
 use crate::editing::CachedCounts;
 use crate::glance::FirstLook;
 use crate::kept::StoredInput;
 use crate::loading::{Appearance, Input, JobId, Loader, Watch};
+use crate::measure::Ruler;
+use crate::messages::MessageSender;
+use crate::opening::{Arrival, JobTarget};
 use crate::playing::Playing;
 
 /// What is open.
 pub(crate) struct Session {
     pub(crate) history: History,
+    /// Version of the document; every change increases it.
+    pub(crate) version: u64,
+    pub(crate) counted: CachedCounts,
+    /// The clipping box before the unfinished change; the inner `None` is no box.
+    pub(crate) clip_before: Option<Option<ClipBox>>,
     pub(crate) loader: Loader,
+    /// What the points of each job are for.
+    pub(crate) jobs: HashMap<JobId, JobTarget>,
+    /// The watched files, which are read again when they change; `None` watches none.
+    pub(crate) watches: Option<HashMap<PathBuf, Watch>>,
     pub(crate) playing: Playing,
-    /// The layer that receives the points of a job, once the layer exists.
-    pub(crate) loading: HashMap<JobId, LayerId>,
-    /// How each input that is being read will be shown.
-    pub(crate) appearances: HashMap<JobId, Appearance>,
-    /// Jobs that read a file again, and the layer that receives the points.
-    pub(crate) reloads: HashMap<JobId, LayerId>,
+    /// The input that each layer was read from.
+    pub(crate) inputs: HashMap<LayerId, Input>,
+    /// Inputs that could not be read. A session keeps them.
+    pub(crate) failed: Vec<(Input, Appearance)>,
     /// Recently opened inputs, newest first.
     pub(crate) recent: Vec<StoredInput>,
     /// File of the session, written on exit.
     pub(crate) file: Option<PathBuf>,
-    /// Whether files are read again when they change.
-    pub(crate) watch: bool,
-    pub(crate) watches: HashMap<PathBuf, Watch>,
-    /// The input that each layer was read from.
-    pub(crate) inputs: HashMap<LayerId, Input>,
     /// The up axis that the user chose; `None` uses the guessed one.
     pub(crate) up_axis: Option<Axes>,
     pub(crate) guessed_axes: Option<Axes>,
     /// What the reading thread found about the only open input, and the document version that this holds for.
     pub(crate) glance: Option<(u64, FirstLook)>,
-    /// Version of the document; every change increases it.
-    pub(crate) version: u64,
-    pub(crate) counted: CachedCounts,
-    /// Inputs that could not be read. A session keeps them.
-    pub(crate) failed: Vec<(Input, Appearance)>,
+    /// The points that have arrived since the view was told.
+    pub(crate) arrival: Arrival,
+    pub(crate) messages: MessageSender,
 }
 
 impl Session {
-    /// An empty session. `context` is asked for a repaint when a thread has read something.
-    pub(crate) fn new(file: Option<PathBuf>, watch: bool, recent: Vec<StoredInput>, context: &egui::Context) -> Self {
+    /// An empty session, to be stored in `file`. `context` is asked for a repaint when a thread has read something.
+    pub(crate) fn new(
+        file: Option<PathBuf>,
+        watch: bool,
+        recent: Vec<StoredInput>,
+        messages: MessageSender,
+        context: &egui::Context,
+    ) -> Self {
         Self {
             history: History::default(),
+            version: 1,
+            counted: CachedCounts::default(),
+            clip_before: None,
             loader: Loader::start(context.clone()),
+            jobs: HashMap::new(),
+            watches: watch.then(HashMap::new),
             playing: Playing::default(),
-            loading: HashMap::new(),
-            appearances: HashMap::new(),
-            reloads: HashMap::new(),
+            inputs: HashMap::new(),
+            failed: Vec::new(),
             recent,
             file,
-            watch,
-            watches: HashMap::new(),
-            inputs: HashMap::new(),
             up_axis: None,
             guessed_axes: None,
             glance: None,
-            version: 1,
-            counted: CachedCounts::default(),
-            failed: Vec::new(),
+            arrival: Arrival::Nothing,
+            messages,
         }
+    }
+
+    /// Whether nothing is open, being read or playing.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.document().layers.is_empty() && self.loader.jobs().is_empty() && self.playing.is_empty()
+    }
+
+    /// The up axis: as chosen, else as guessed, else Z.
+    pub(crate) fn axes(&self) -> Axes {
+        self.up_axis.or(self.guessed_axes).unwrap_or(Axes::ZUp)
+    }
+
+    /// Chooses the next up axis: as guessed, then Z, Y, and -Y.
+    pub(crate) fn change_up_axis(&mut self) {
+        self.up_axis = match self.up_axis {
+            None => Some(Axes::ZUp),
+            Some(Axes::ZUp) => Some(Axes::YUp),
+            Some(Axes::YUp) => Some(Axes::Camera),
+            Some(Axes::Camera) => None,
+        };
+    }
+
+    /// Unit vector upward, world space.
+    pub(crate) fn up(&self) -> DVec3 {
+        match self.axes() {
+            Axes::ZUp => DVec3::Z,
+            Axes::YUp => DVec3::Y,
+            Axes::Camera => DVec3::NEG_Y,
+        }
+    }
+
+    /// A ruler in the units of the first layer.
+    pub(crate) fn ruler(&self) -> Ruler {
+        let crs = self.document().layers.first().map(|layer| layer.cloud.crs().clone()).unwrap_or_default();
+        Ruler::new(&crs, self.up())
     }
 }

@@ -20,15 +20,15 @@ fn everything_that_can_be_used_has_a_name() {
     window.press(Key::Escape);
     window.press(Key::H);
     window.press(Key::C);
-    crate::keys::run(window.harness.state_mut(), &context, Command::Screenshot);
+    window.harness.state_mut().run(Command::Screenshot, &context);
     window.steps(3);
-    assert!(window.says("Radius of the brush") || window.app().ui.tool == Tool::Brush, "C takes the brush");
+    assert!(window.says("Radius of the brush") || window.app().ui.tools.current == Tool::Brush, "C takes the brush");
     look(&window, "picture, help and brush");
     window.key(CTRL, Key::T);
     window.steps(3);
     look(&window, "film");
     window.press(Key::Escape);
-    crate::keys::run(window.harness.state_mut(), &context, Command::SaveState);
+    window.harness.state_mut().run(Command::SaveState, &context);
     window.steps(3);
     look(&window, "session");
     (0..4).for_each(|_| window.press(Key::Escape));
@@ -90,7 +90,7 @@ fn a_small_window_has_room_for_everything() {
     window.press(Key::P);
     for command in [Command::Export, Command::Screenshot, Command::Help, Command::Film] {
         let context = window.harness.ctx.clone();
-        crate::keys::run(window.harness.state_mut(), &context, command);
+        window.harness.state_mut().run(command, &context);
         window.steps(4);
         let (_, outside) = crowding(&window);
         assert!(outside.is_empty(), "{command:?}: {outside:#?}");

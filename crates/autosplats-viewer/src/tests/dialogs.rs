@@ -9,7 +9,7 @@ use crate::commands::Command;
 /// Opens a dialog and types the output file.
 fn ask(window: &mut Window, command: Command, path: &Path) {
     let context = window.harness.ctx.clone();
-    crate::keys::run(window.harness.state_mut(), &context, command);
+    window.harness.state_mut().run(command, &context);
     window.steps(3);
     if command == Command::Film {
         // A full film of two hundred large pictures would test nothing more.
@@ -147,5 +147,5 @@ fn enter_leaves_by_exporting() {
     window.steps(3);
     assert!(window.says("Edits are not saved"), "it is asked");
     window.press(Key::Enter);
-    assert!(window.app().ui.panels.export.open && !window.app().ui.quit, "Enter does no harm");
+    assert!(window.app().ui.panels.export.open && !window.app().ui.panels.quit, "Enter does no harm");
 }

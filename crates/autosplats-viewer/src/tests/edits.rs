@@ -4,7 +4,7 @@ use super::*;
 use crate::document::Counts;
 
 fn counts(window: &Window) -> Counts {
-    window.app().document().counts()
+    window.app().session.document().counts()
 }
 
 /// Selects by a rectangle in the middle of the picture.
@@ -28,7 +28,7 @@ fn a_rectangle_selects_delete_removes_undo_brings_back() {
     window.press(Key::Delete);
     let left = counts(&window);
     assert_eq!((left.selected, left.deleted), (0, selected), "they are gone");
-    let shown = window.app().document().shown().len();
+    let shown = window.app().session.document().shown().len();
     assert_eq!(shown, all.points - selected, "and not shown");
     window.settle();
     assert!(window.says(&format!("{STATUE} *")), "the list marks what is not saved");
@@ -77,10 +77,10 @@ fn leaving_with_edits_asks() {
     assert!(!close(&mut window), "the window stays");
     assert!(window.says("Edits are not saved") && window.says(STATUE), "and says why: {:?}", window.words());
     window.click_on("Stay");
-    assert!(!window.says("Edits are not saved") && !window.app().ui.quit, "staying is possible");
+    assert!(!window.says("Edits are not saved") && !window.app().ui.panels.quit, "staying is possible");
     assert!(!close(&mut window), "it asks again");
     window.commands.clear();
     window.click_on("Leave without saving");
-    assert!(window.app().ui.quit && window.commands.contains(&ViewportCommand::Close), "leaving is possible");
+    assert!(window.app().ui.panels.quit && window.commands.contains(&ViewportCommand::Close), "leaving is possible");
     assert!(close(&mut window), "now it closes");
 }

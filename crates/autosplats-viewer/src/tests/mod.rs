@@ -103,7 +103,7 @@ impl Window {
         self.until("the picture is whole", |window| {
             let app = window.app();
             let asked = app.session.loader.jobs().is_empty() && !app.view.navigation.is_moving();
-            let empty = app.document().layers.is_empty() && app.view.shot.is_none();
+            let empty = app.session.document().layers.is_empty() && app.view.shot.is_none();
             asked
                 && (empty
                     || app.view.shot.as_ref().is_some_and(|picture| {
@@ -113,7 +113,7 @@ impl Window {
                             && picture.dots == app.view.look.dots
                             && picture.camera == app.view.navigation.camera()
                             && picture.size == [side(rect.width()), side(rect.height())]
-                            && picture.shown.shows(app.document())
+                            && picture.shown.shows(app.session.document())
                     }))
         });
     }

@@ -138,7 +138,7 @@ fn points_are_inspected_and_measured_where_they_are_clicked() {
     let found = share(&window, &camera(&window), point.position).distance(DVec2::new(0.5, 0.45));
     assert!(found < NEAR, "it is where the click was: {found}");
     window.press(Key::M);
-    assert_eq!(window.app().ui.tool, Tool::Measure, "M measures");
+    assert_eq!(window.app().ui.tools.current, Tool::Measure, "M measures");
     for (number, y) in [(1, 0.40), (2, 0.55)] {
         let place = window.place(0.5, y);
         window.click(place);

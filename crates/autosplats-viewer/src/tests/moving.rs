@@ -20,8 +20,8 @@ fn frames(folder: &Path, count: usize) -> Input {
 fn playing(inputs: Vec<Input>) -> Window {
     let mut window = Window::new(&[]);
     let count = inputs.len();
-    inputs.into_iter().for_each(|input| window.harness.state_mut().open(input));
-    window.until("the first points", |window| window.app().document().layers.len() == count);
+    inputs.into_iter().for_each(|input| window.harness.state_mut().session.open(input));
+    window.until("the first points", |window| window.app().session.document().layers.len() == count);
     window
 }
 
@@ -43,11 +43,12 @@ fn what_is_live_goes_on_when_a_recording_has_ended() {
     );
     std::fs::write(live.path().join("frame_1.xyz"), "50 0 0\n51 0 0\n50 1 0\n").expect("a frame");
     window.until("newer points", |window| {
-        let layers = &window.app().document().layers;
+        let layers = &window.app().session.document().layers;
         layers.iter().any(|layer| layer.cloud.len() == 3)
     });
-    let live = window.app().document().layers.iter().find(|layer| layer.cloud.len() == 3).expect("it is there").id;
-    window.harness.state_mut().give_up(live);
+    let live =
+        window.app().session.document().layers.iter().find(|layer| layer.cloud.len() == 3).expect("it is there").id;
+    window.harness.state_mut().session.give_up(live);
     window.steps(3);
     assert!(!window.app().session.playing.clock.playing, "with nothing live it stops at its end");
 }
@@ -59,7 +60,7 @@ fn what_waits_is_in_the_list() {
     input.play.watch = true;
     let name = input.name.clone();
     let mut window = Window::new(&[]);
-    window.harness.state_mut().open(input);
+    window.harness.state_mut().session.open(input);
     window.until("a word", |window| window.says("waits for points"));
     assert!(window.says(&name), "with its name: {:?}", window.words());
     assert!(!window.says("Drop point clouds here") && !window.says("Nothing is open"), "something is open");
@@ -76,7 +77,7 @@ fn the_inspector_says_how_recordings_are_aligned() {
     assert!(matches!(twice[0].source, Source::Recording(_)), "by its name");
     let mut window = playing(twice);
     let words = |window: &Window| {
-        let ids: Vec<_> = window.app().document().layers.iter().map(|layer| layer.id).collect();
+        let ids: Vec<_> = window.app().session.document().layers.iter().map(|layer| layer.id).collect();
         ids.into_iter().map(|id| window.app().session.playing.alignment(id)).collect::<Vec<_>>()
     };
     let by_clock = |words: &[Option<String>]| {
@@ -85,16 +86,16 @@ fn the_inspector_says_how_recordings_are_aligned() {
     window.until("both are open", |window| by_clock(&words(window)));
     // Points of both inputs lie at the same places.
     window.harness.state_mut().ui.tools.inspected = {
-        let document = window.app().document();
+        let document = window.app().session.document();
         document.describe(&document.shown(), 0)
     };
     window.steps(3);
     assert!(window.says("Begins") && window.says("0.000 s after the first input, by its time stamps"), "it is told");
     let folder = tempfile::tempdir().expect("a folder");
-    let first = window.app().document().layers[0].id;
-    window.harness.state_mut().give_up(first);
-    window.harness.state_mut().open(frames(folder.path(), 3));
-    window.until("the folder", |window| window.app().document().layers.len() == 2);
+    let first = window.app().session.document().layers[0].id;
+    window.harness.state_mut().session.give_up(first);
+    window.harness.state_mut().session.open(frames(folder.path(), 3));
+    window.until("the folder", |window| window.app().session.document().layers.len() == 2);
     window.until("both", |window| words(window).iter().all(Option::is_some));
     assert!(!by_clock(&words(&window)), "files have no clock: {:?}", words(&window));
 }
@@ -120,11 +121,11 @@ fn film(window: &mut Window, choice: &str, path: &Path) -> Vec<Vec<u8>> {
 fn films_show_what_moves_or_stand_still() {
     let [folder, out] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
     let mut window = playing(vec![frames(folder.path(), 3)]);
-    window.harness.state_mut().toggle_playing();
+    window.harness.state_mut().session.playing.clock.toggle();
     window.harness.state_mut().session.playing.clock.seek(0.0);
     window.settle();
     let context = window.harness.ctx.clone();
-    crate::keys::run(window.harness.state_mut(), &context, Command::Film);
+    window.harness.state_mut().run(Command::Film, &context);
     window.steps(3);
     assert!(window.says("0.00 to 0.30 s at 1.00×, repeatedly"), "it runs: {:?}", window.words());
     window.harness.state_mut().ui.panels.film.still_for_tests();

@@ -13,9 +13,9 @@ fn a_scene_is_shown_and_listed() {
     let window = Window::with_statue();
     let app = window.app();
     let shot = app.view.shot.as_ref().expect("there is a picture");
-    assert_eq!(app.document().layers.len(), 1, "one thing is open");
+    assert_eq!(app.session.document().layers.len(), 1, "one thing is open");
     assert!(window.says(STATUE), "its name is in the list: {:?}", window.words());
-    let points = app.document().layers[0].cloud.len();
+    let points = app.session.document().layers[0].cloud.len();
     assert!(window.says(&format!("{} points", crate::document::grouped(points))), "and its number of points");
     let [width, height] = shot.size;
     let share = shot.counts.covered as f64 / f64::from(width * height);
@@ -35,7 +35,7 @@ fn what_cannot_be_read_says_why_in_place() {
     for name in ["broken.ply", "absent.laz"] {
         assert!(window.says(name), "{name} is explained: {:?}", window.words());
     }
-    assert_eq!(window.app().document().layers.len(), 1, "what can be read is there all the same");
+    assert_eq!(window.app().session.document().layers.len(), 1, "what can be read is there all the same");
     // Errors stay until they are closed.
     window.steps(700);
     assert!(window.says("broken.ply"), "errors do not go by themselves");
@@ -60,8 +60,8 @@ fn the_first_view_is_the_same_whoever_finds_it() {
     // The reading thread knows the picture's shape once the window has been drawn.
     let mut window = Window::new(&[]);
     window.settle();
-    window.harness.state_mut().open(Input::file(path));
-    window.until("it is read", |window| !window.app().document().layers.is_empty());
+    window.harness.state_mut().session.open(Input::file(path));
+    window.until("it is read", |window| !window.app().session.document().layers.is_empty());
     window.settle();
     let camera = window.app().view.navigation.goal_camera();
     // The navigation keeps orientations as quaternions, whose conversion rounds.
@@ -72,7 +72,7 @@ fn the_first_view_is_the_same_whoever_finds_it() {
     app.session.glance = None;
     app.view.navigation.orbit(autosplats::cloud::glam::DVec2::new(0.3, 0.1));
     assert!(!same(app.view.navigation.goal_camera()), "the comparison can tell");
-    app.first_view();
+    app.view.first_view(&app.session);
     assert!(same(app.view.navigation.goal_camera()), "as the window finds it by itself");
 }
 
@@ -126,7 +126,7 @@ fn settings_are_kept_between_starts() {
     window.harness.state_mut().view.look.two_fingers = crate::look::TwoFingers::Pan;
     window.harness.state_mut().session.recent = vec![StoredInput::of(&played(), crate::loading::Appearance::default())];
     let mut memory = Memory::default();
-    storage::save(window.app(), &mut memory);
+    storage::save(&window.app().session, &window.app().view, &mut memory);
     let (look, recent) = storage::load(Some(&memory));
     assert_eq!(look, window.app().view.look, "the look comes back");
     assert_eq!(recent, window.app().session.recent, "and what was opened");
@@ -144,6 +144,6 @@ fn settings_are_kept_between_starts() {
     assert_eq!(storage::load(None).0, Look::default(), "nothing was kept");
     // Values that the renderer rejects become defaults too.
     window.harness.state_mut().view.look.settings.reconstruction.k = 100_000;
-    storage::save(window.app(), &mut memory);
+    storage::save(&window.app().session, &window.app().view, &mut memory);
     assert_eq!(storage::load(Some(&memory)).0, Look::default(), "k of 100,000 is out of range");
 }

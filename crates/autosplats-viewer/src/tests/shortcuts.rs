@@ -51,16 +51,16 @@ fn wanted(direction: ViewDirection) -> Option<DVec3> {
 
 /// Presses the shortcut of a command and checks its effect.
 fn check(window: &mut Window, command: Command) {
-    let counts = |window: &Window| window.app().document().counts();
+    let counts = |window: &Window| window.app().session.document().counts();
     let before = counts(window);
     let view = window.app().view.navigation.goal_camera();
     let (dots, look) = (window.app().view.look.dots, window.app().ui.panels.look);
-    let (inputs, statistics) = (window.app().ui.panels.inputs, window.app().ui.panels.statistics);
+    let (inputs, statistics) = (window.app().ui.panels.inputs.open, window.app().ui.panels.statistics);
     let orthographic = window.app().view.navigation.is_orthographic();
     match command {
         Command::InvertSelection | Command::HideSelected | Command::DeleteSelected | Command::CropToSelected => {
             // Half of the points, selected without waiting for a picture.
-            window.harness.state_mut().change(|document| {
+            window.harness.state_mut().session.change(|document| {
                 let shown = document.shown();
                 document.select(&shown, |index| index % 2 == 0, crate::document::SelectMode::Replace);
             });
@@ -102,7 +102,7 @@ fn check(window: &mut Window, command: Command) {
             assert!(!window.app().ui.panels.session.open, "Escape closes it");
         }
         Command::CloseAll => {
-            assert!(app.document().layers.is_empty(), "nothing is open any more");
+            assert!(app.session.document().layers.is_empty(), "nothing is open any more");
             give(window, Command::Undo);
             assert_eq!(counts(window).points, before.points, "undo opens it again");
         }
@@ -151,7 +151,7 @@ fn check(window: &mut Window, command: Command) {
             }
         }
         Command::OppositeView => {
-            let up = app.up();
+            let up = app.session.up();
             let [a, b] = [view, now].map(|camera| (camera.look_at - camera.eye).reject_from(up));
             let other = if a.length() > 1e-2 * view.eye.distance(view.look_at) { a.dot(b) < 0.0 } else { now != view };
             assert!(other, "{view:?} to {now:?}");
@@ -170,7 +170,7 @@ fn check(window: &mut Window, command: Command) {
             give(window, command);
             let camera = window.app().view.navigation.goal_camera();
             let [right, ..] = camera.axes().expect("it sees");
-            assert!(right.dot(window.app().up()).abs() < 1e-9, "the horizon is level: {right}");
+            assert!(right.dot(window.app().session.up()).abs() < 1e-9, "the horizon is level: {right}");
         }
         Command::CopyView => {
             let copied = window.outputs.iter().find_map(|output| match output {
@@ -199,7 +199,7 @@ fn check(window: &mut Window, command: Command) {
             window.settle();
             give(window, command);
         }
-        Command::Inputs => assert_ne!(app.ui.panels.inputs, inputs, "the list comes or goes"),
+        Command::Inputs => assert_ne!(app.ui.panels.inputs.open, inputs, "the list comes or goes"),
         Command::Look => assert_ne!(app.ui.panels.look, look, "the panel comes or goes"),
         Command::Statistics => assert_ne!(app.ui.panels.statistics, statistics, "the window comes or goes"),
         Command::Help => {
@@ -211,7 +211,7 @@ fn check(window: &mut Window, command: Command) {
             give(window, command);
         }
         Command::Clip => {
-            let clips = |window: &Window| window.app().document().clip.is_some_and(|clip| clip.enabled);
+            let clips = |window: &Window| window.app().session.document().clip.is_some_and(|clip| clip.enabled);
             assert!(clips(window), "a box is around the points");
             give(window, command);
             assert!(!clips(window), "and clips no longer");
@@ -221,7 +221,7 @@ fn check(window: &mut Window, command: Command) {
             window.press(Key::Escape);
             assert_eq!(focused(window), None, "Escape gives it back");
         }
-        Command::Tool(tool) => assert_eq!(app.ui.tool, tool, "the tool is taken"),
+        Command::Tool(tool) => assert_eq!(app.ui.tools.current, tool, "the tool is taken"),
         #[allow(unreachable_patterns, reason = "a new command has no case before it is written")]
         other => panic!("{other:?}: say here what its key does"),
     }
@@ -273,8 +273,8 @@ fn f6_goes_round_the_window_and_tab_through_a_panel() {
         window.step();
         assert!(place(&window) != before && place(&window).x > picture.right(), "from control to control in it");
     }
-    let selected = |window: &Window| window.app().document().counts().selected;
-    window.harness.state_mut().change(|document| {
+    let selected = |window: &Window| window.app().session.document().counts().selected;
+    window.harness.state_mut().session.change(|document| {
         let shown = document.shown();
         document.select(&shown, |_| true, crate::document::SelectMode::Replace);
     });
@@ -307,7 +307,7 @@ fn every_key_does_what_its_command_says() {
         } else if command == Command::UpAxis {
             window.harness.state_mut().session.up_axis = None;
         }
-        if window.app().shown().is_none() {
+        if window.app().view.shown(&window.app().session).is_none() {
             window.settle();
         }
         check(&mut window, command);

@@ -76,14 +76,14 @@ fn anything(window: &mut Window, chance: &mut Chance) {
         8 => {
             if let Ok(input) = Input::parse(SCENES[chance.below(SCENES.len())]) {
                 // More layers make pictures slow and test nothing more.
-                if window.app().document().layers.len() < 3 {
-                    window.harness.state_mut().open(input);
+                if window.app().session.document().layers.len() < 3 {
+                    window.harness.state_mut().session.open(input);
                 }
             }
         }
         9 => {
             let context = window.harness.ctx.clone();
-            crate::keys::run(window.harness.state_mut(), &context, Command::CloseAll);
+            window.harness.state_mut().run(Command::CloseAll, &context);
             if chance.below(2) == 0 {
                 window.press(Key::Escape);
             }
@@ -124,7 +124,7 @@ fn rest(window: &mut Window) -> f64 {
     app.ui.panels.film.stop();
     window.until("everything is closed", |window| {
         let app = window.app();
-        app.session.loader.jobs().is_empty() && app.document().layers.is_empty() && app.view.render.is_idle()
+        app.session.loader.jobs().is_empty() && app.session.document().layers.is_empty() && app.view.render.is_idle()
     });
     // Pending results are received, and writing threads release their data.
     for _ in 0..10 {

@@ -6,24 +6,24 @@ use eframe::egui::{Event, Key, Modifiers, PointerButton, Rect, pos2, vec2};
 
 use super::*;
 use crate::Options;
+use crate::app::App;
 use crate::document::Layer;
 use crate::look::Look;
-use crate::output::Goal;
-use crate::render::{Answer, Outcome};
+use crate::render::{Answer, Goal, Outcome};
 
 /// An application in a window of 200 by 200 points. Its cloud has two points, one of them in the middle of the window.
 fn app(context: &egui::Context, tool: Tool) -> App {
     let mut app = App::new(Options::default(), Look::default(), Vec::new(), context);
     let cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3], [0.5, 0.0, 0.0]]);
-    app.change(|document| document.add(Layer::new("two", None, Arc::new(cloud))));
+    app.session.change(|document| document.add(Layer::new("two", None, Arc::new(cloud))));
     let camera = autosplats::Camera {
         eye: DVec3::new(0.0, -3.0, 0.0),
         look_at: DVec3::ZERO,
         up: DVec3::Z,
         projection: autosplats::Projection::PerspectiveFovDeg(40.0),
     };
-    app.set_camera(&camera);
-    app.ui.tool = tool;
+    app.view.set_camera(&camera);
+    app.ui.tools.current = tool;
     // Selecting visible points only would need a picture.
     app.ui.tools.through = true;
     frame(&mut app, context, Event::PointerMoved(pos2(100.0, 100.0)));
@@ -39,7 +39,7 @@ fn frame(app: &mut App, context: &egui::Context, event: Event) {
             app.ui.tools.cancel_drag();
         }
         let response = ui.allocate_rect(rect, egui::Sense::click_and_drag());
-        drag(app, &response, [200, 200]);
+        app.ui.tools.drag(&app.session, &app.view, &response, [200, 200]);
     });
     // There is nothing to draw on.
     output.textures_delta.clear();
@@ -52,7 +52,7 @@ fn button(pressed: bool, place: Pos2) -> Event {
 /// Number of points hit by the requested selection, if there was one.
 fn hits(app: &App) -> Option<usize> {
     // Tasks run in order: when this one is answered, so are all before it.
-    let (wish, region) = (Box::new(app.wish([200, 200], false)), Region::brush(&[], 1.0));
+    let (wish, region) = (Box::new(app.view.wish(&app.session, [200, 200], false)), Region::brush(&[], 1.0));
     app.view.render.task(Task::Select { wish, region, through: true, mode: SelectMode::Intersect });
     let mut hits = None;
     let end = Instant::now() + Duration::from_secs(60);
@@ -113,7 +113,7 @@ fn pictures_of_dots_have_dots_as_large_as_the_screen() {
     let mut app = app(&context, Tool::Navigate);
     (app.view.look.dots, app.view.look.dot_size) = (true, 4);
     app.view.look.backend = autosplats::Backend::Cpu;
-    let (wish, goal) = (Box::new(app.wish([40, 40], false)), Goal::Film(0));
+    let (wish, goal) = (Box::new(app.view.wish(&app.session, [40, 40], false)), Goal::Film(0));
     app.view.render.task(Task::Photograph { wish, goal });
     let end = Instant::now() + Duration::from_secs(60);
     let image = loop {
@@ -135,10 +135,10 @@ fn pictures_of_dots_have_dots_as_large_as_the_screen() {
 fn a_double_click_measures_one_corner() {
     let context = egui::Context::default();
     let mut app = app(&context, Tool::Measure);
-    let shown = Arc::new(app.document().shown());
+    let shown = Arc::new(app.session.document().shown());
     for index in [0, 0, 1, 1, 0] {
         let seen = PickHit { index, shown: Arc::clone(&shown), surface: DVec3::ZERO };
-        app.picked(Purpose::Measure, Some(seen));
+        app.ui.tools.picked(&app.session, Purpose::Measure, Some(seen));
     }
     let [one, other] = [DVec3::ZERO, DVec3::new(0.5, 0.0, 0.0)];
     assert_eq!(app.ui.tools.measured, [one, other, one], "none twice in a row");
@@ -150,9 +150,13 @@ fn all_dots_can_be_selected() {
     let mut app = app(&context, Tool::Lasso);
     let reconstruction = app.view.look.settings.reconstruction.clone();
     assert!(reconstruction.outlier_expansions.is_some(), "outliers are left out of surfaces");
-    assert_eq!(app.wish([9, 9], false).of_points().settings.reconstruction, reconstruction, "and stay so");
+    assert_eq!(
+        app.view.wish(&app.session, [9, 9], false).of_points().settings.reconstruction,
+        reconstruction,
+        "and stay so"
+    );
     app.view.look.dots = true;
-    let wish = app.wish([9, 9], false).of_points();
+    let wish = app.view.wish(&app.session, [9, 9], false).of_points();
     assert_eq!(wish.dots, None, "found by a surface");
     assert_eq!(wish.settings.reconstruction.outlier_expansions, None, "that has all points");
 }

@@ -1,14 +1,22 @@
 //! The view: the camera, and the pictures that the render thread makes for it.
 
-use autosplats::{AdapterSummary, Camera};
-use eframe::egui;
+mod camera;
+mod output;
+mod pictures;
 
-use crate::app::RequestKey;
+use std::sync::Arc;
+
+use autosplats::{AdapterSummary, Camera};
+use eframe::egui::{self, Color32, Sense};
+
+use self::pictures::RequestKey;
 use crate::look::Look;
+use crate::messages::MessageSender;
 use crate::navigation::Navigation;
 use crate::rate::Rate;
 use crate::recording::Recording;
 use crate::render::{Picture, RenderThread};
+use crate::screen::OnScreen;
 use crate::turns::Turns;
 
 /// The camera and its pictures.
@@ -30,25 +38,28 @@ pub(crate) struct View {
     /// Whether a camera was given, so that the first input is not fitted into the picture.
     pub(crate) camera_given: bool,
     /// What the last requested picture shows.
-    pub(crate) wished: Option<RequestKey>,
+    wished: Option<RequestKey>,
     /// Whether the last requested picture is still to come.
-    pub(crate) awaited: bool,
+    awaited: bool,
     /// Whether a film preview has moved the view since the last window frame.
-    pub(crate) moved_by_preview: bool,
+    moved_by_preview: bool,
     /// Time of the last movement, seconds.
-    pub(crate) moved: f64,
+    moved: f64,
     /// Key cameras of a film.
     pub(crate) keys: Vec<Camera>,
     pub(crate) recording: Option<Recording>,
     /// Pixel format of the window; `None` without a device, and then no picture is drawn in the window.
     pub(crate) format: Option<eframe::wgpu::TextureFormat>,
+    /// Why the last picture could not be rendered, until there is one.
+    pub(crate) failure: Option<String>,
+    messages: MessageSender,
     /// Present if the CPU draws the window, and so competes with rendering.
     pub(crate) turns: Option<Turns>,
 }
 
 impl View {
     /// A view of nothing. `context` is asked for a repaint with each picture.
-    pub(crate) fn new(look: Look, context: &egui::Context) -> Self {
+    pub(crate) fn new(look: Look, messages: MessageSender, context: &egui::Context) -> Self {
         Self {
             render: RenderThread::start(context.clone()),
             navigation: Navigation::new(),
@@ -67,7 +78,37 @@ impl View {
             keys: Vec::new(),
             recording: None,
             format: None,
+            failure: None,
+            messages,
             turns: None,
+        }
+    }
+
+    /// Takes all free room of the window for the picture. Returns the mouse's response and the size in pixels.
+    pub(crate) fn place(&mut self, ui: &mut egui::Ui) -> (egui::Response, [u32; 2]) {
+        let rect = ui.available_rect_before_wrap();
+        let response = ui.allocate_rect(rect, Sense::CLICK | Sense::DRAG);
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Surface of the points"));
+        let scale = ui.ctx().pixels_per_point();
+        let side = |points: f32| ((points * scale).round() as u32).clamp(1, autosplats::MAX_SIDE);
+        let size = [side(rect.width()), side(rect.height())];
+        self.rect = rect;
+        self.aspect = f64::from(size[0]) / f64::from(size[1]);
+        (response, size)
+    }
+
+    /// Paints the last picture into its place, or a plain background.
+    pub(crate) fn paint(&self, ui: &egui::Ui) {
+        let painter = ui.painter_at(self.rect);
+        match (&self.shot, self.format) {
+            (Some(picture), Some(format)) => {
+                let on_screen = OnScreen { image: Arc::clone(&picture.image), sharp: picture.dots, format };
+                painter.add(eframe::egui_wgpu::Callback::new_paint_callback(self.rect, on_screen));
+            }
+            (Some(_), None) => {}
+            (None, _) => {
+                painter.rect_filled(self.rect, 0.0, Color32::from_rgb(0x2b, 0x30, 0x37));
+            }
         }
     }
 }

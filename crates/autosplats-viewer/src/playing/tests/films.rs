@@ -12,7 +12,7 @@ use crate::render::{Answer, Outcome};
 /// Writes a film of some clock positions. Returns its pictures in order, or why there are none.
 fn film(app: &mut App, context: &egui::Context, places: &[f64], folder: &Path) -> Result<Vec<Image>, String> {
     let target = Target::new(&folder.join("f.png")).expect("pictures");
-    let wish = app.wish([48, 32], false);
+    let wish = app.view.wish(&app.session, [48, 32], false);
     let cameras = vec![wish.camera; places.len()];
     let reel = Reel::start(app.session.playing.tracks(places), app.ui.messages.sender(), context.clone());
     let mut recording = Recording::start(wish, cameras, Some(reel), 25, target, context);
@@ -21,7 +21,7 @@ fn film(app: &mut App, context: &egui::Context, places: &[f64], folder: &Path) -
     loop {
         assert!(begun.elapsed() < Duration::from_secs(60), "the film does not end");
         if let Some(wish) = recording.wanted()? {
-            let goal = crate::output::Goal::Film(recording.number);
+            let goal = crate::render::Goal::Film(recording.number);
             app.view.render.task(crate::render::Task::Photograph { wish: Box::new(wish), goal });
         }
         for answer in app.view.render.answers().collect::<Vec<_>>() {
@@ -63,7 +63,7 @@ fn each_picture_shows_the_frame_of_its_time() {
     let mut player = source.source.play(&source.play, &options, &()).expect("it plays");
     let mut renderer = Renderer::with_backend(Backend::Cpu).expect("a processor");
     let mut settings = app.view.look.settings.clone();
-    let axes = app.axes();
+    let axes = app.session.axes();
     for (number, (picture, frame)) in pictures.iter().zip([0, 1, 1, 3, 4, 2, 0]).enumerate() {
         let cloud = player.frame(frame, &()).expect("a frame");
         let cloud = autosplats::cloud::PointCloud::clone(&cloud).with_axes(axes);

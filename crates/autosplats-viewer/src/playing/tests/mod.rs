@@ -38,18 +38,18 @@ fn pictures_of_what_is_live_are_there_before_the_next_update() {
 }
 
 /// Runs the application until `done` returns true.
-fn until(app: &mut App, context: &egui::Context, what: &str, done: impl Fn(&App) -> bool) {
+fn until(app: &mut App, what: &str, done: impl Fn(&App) -> bool) {
     let begun = Instant::now();
     while !done(app) {
         assert!(begun.elapsed() < Duration::from_secs(60), "{what} does not come");
-        app.follow_streams(context);
+        app.session.follow_streams(0.0);
         std::thread::sleep(Duration::from_millis(2));
     }
 }
 
 /// Smallest x of the shown points.
 fn left(app: &App) -> Option<f64> {
-    let layer = app.document().layers.first()?;
+    let layer = app.session.document().layers.first()?;
     (0..layer.cloud.len()).map(|point| layer.cloud.world_position(point).x).reduce(f64::min)
 }
 
@@ -62,7 +62,7 @@ fn app_of(input: Input, context: &egui::Context) -> App {
     let options = Options { inputs: vec![input], backend: Some(Backend::Cpu), ..Options::default() };
     let mut app = App::new(options, Look::default(), Vec::new(), context);
     // The context's clock stands still, so that the first frame stays.
-    until(&mut app, context, "the first frame", |app| left(app) == Some(0.0));
+    until(&mut app, "the first frame", |app| left(app) == Some(0.0));
     app
 }
 
@@ -78,14 +78,14 @@ fn a_folder_is_played_by_the_clock() {
     );
     assert_eq!(app.session.playing.frame(), Some((0, 5)));
     app.session.playing.clock.seek(0.35);
-    until(&mut app, &context, "the fourth frame", |app| left(app) == Some(30.0));
+    until(&mut app, "the fourth frame", |app| left(app) == Some(30.0));
     app.session.playing.step(true);
-    until(&mut app, &context, "the fifth frame", |app| left(app) == Some(40.0));
+    until(&mut app, "the fifth frame", |app| left(app) == Some(40.0));
     assert!(!app.session.playing.clock.playing, "whoever steps wants to look");
     app.session.playing.step(true);
     assert_eq!(app.session.playing.frame(), Some((4, 5)), "there is none behind the last");
     app.session.playing.step(false);
-    until(&mut app, &context, "the fourth frame again", |app| left(app) == Some(30.0));
+    until(&mut app, "the fourth frame again", |app| left(app) == Some(30.0));
 }
 
 #[test]
@@ -93,23 +93,23 @@ fn edits_are_not_played_over() {
     let folder = tempfile::tempdir().expect("a folder");
     let context = egui::Context::default();
     let mut app = app(&sequence(folder.path(), 5), &context);
-    let incomplete = |app: &App| app.document().layers[0].incomplete;
+    let incomplete = |app: &App| app.session.document().layers[0].incomplete;
     assert!(incomplete(&app), "what moves is not edited");
-    app.toggle_playing();
-    until(&mut app, &context, "a pause", |app| !incomplete(app));
+    app.session.playing.clock.toggle();
+    until(&mut app, "a pause", |app| !incomplete(app));
     delete(&mut app);
-    app.toggle_playing();
-    app.follow_streams(&context);
+    app.session.playing.clock.toggle();
+    app.session.follow_streams(0.0);
     assert!(!app.session.playing.clock.playing, "it waits");
-    app.undo();
-    app.toggle_playing();
-    app.follow_streams(&context);
+    app.session.undo();
+    app.session.playing.clock.toggle();
+    app.session.follow_streams(0.0);
     assert!(app.session.playing.clock.playing, "nothing would be lost any more");
 }
 
 /// Deletes seven points.
 fn delete(app: &mut App) {
-    app.edit_points("Delete", |document| {
+    app.session.edit_points("Delete", |document| {
         let shown = document.shown();
         document.select(&shown, |index| index < 7, crate::document::SelectMode::Replace);
         document.delete_selected()
@@ -121,8 +121,8 @@ fn what_is_removed_is_not_played_on() {
     let folder = tempfile::tempdir().expect("a folder");
     let context = egui::Context::default();
     let mut app = app(&sequence(folder.path(), 5), &context);
-    app.give_up(app.document().layers[0].id);
-    assert!(app.session.playing.is_empty() && app.document().layers.is_empty(), "nothing is left of it");
+    app.session.give_up(app.session.document().layers[0].id);
+    assert!(app.session.playing.is_empty() && app.session.document().layers.is_empty(), "nothing is left of it");
 }
 
 #[test]
@@ -132,9 +132,9 @@ fn what_cannot_be_played_is_told() {
     let input = Input::parse(&folder.path().display().to_string()).expect("a folder");
     let options = Options { inputs: vec![input], backend: Some(Backend::Cpu), ..Options::default() };
     let mut app = App::new(options, Look::default(), Vec::new(), &context);
-    until(&mut app, &context, "the failure", |app| app.session.playing.is_empty());
+    until(&mut app, "the failure", |app| app.session.playing.is_empty());
     assert_eq!(app.session.failed.len(), 1, "a session keeps its name");
-    assert!(app.document().layers.is_empty(), "and nothing is shown");
+    assert!(app.session.document().layers.is_empty(), "and nothing is shown");
 }
 
 #[test]
@@ -146,16 +146,16 @@ fn what_waits_for_its_first_points_says_so() {
     let options = Options { inputs: vec![input.clone()], backend: Some(Backend::Cpu), ..Options::default() };
     let mut app = App::new(options, Look::default(), Vec::new(), &context);
     let why = |app: &App| app.session.playing.waiting().next().map(|waiting| waiting.why);
-    until(&mut app, &context, "a word", |app| why(app).is_some_and(|why| why.contains("points")));
+    until(&mut app, "a word", |app| why(app).is_some_and(|why| why.contains("points")));
     // A stream that is paused before its first points still shows them.
-    app.toggle_playing();
+    app.session.playing.clock.toggle();
     std::fs::write(folder.path().join("frame_0.xyz"), "0 0 0\n1 0 0\n0 1 0\n").expect("a frame");
-    until(&mut app, &context, "the first points", |app| left(app) == Some(0.0));
+    until(&mut app, "the first points", |app| left(app) == Some(0.0));
     assert_eq!(why(&app), None, "it waits no longer");
-    app.open(input);
+    app.session.open(input);
     assert!(why(&app).is_some(), "another one does");
     let context = egui::Context::default();
-    crate::keys::run(&mut app, &context, crate::commands::Command::CloseAll);
-    app.follow_streams(&context);
+    app.run(crate::commands::Command::CloseAll, &context);
+    app.session.follow_streams(0.0);
     assert!(app.session.playing.is_empty() && app.session.failed.is_empty(), "closed as all is");
 }

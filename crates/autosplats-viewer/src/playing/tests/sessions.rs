@@ -8,13 +8,14 @@ use crate::state::State;
 fn again(path: &Path, context: &egui::Context) -> App {
     let options = Options { backend: Some(Backend::Cpu), ..Options::default() };
     let mut app = App::new(options, Look::default(), Vec::new(), context);
-    State::read(path).expect("a session").restore(&mut app, path.parent().expect("a folder"));
+    let folder = path.parent().expect("a folder");
+    State::read(path).expect("a session").restore(&mut app.session, &mut app.view, folder);
     app
 }
 
 /// The inputs of a session, as JSON.
 fn inputs(app: &App) -> serde_json::Value {
-    serde_json::to_value(State::of(app)).expect("a state")["inputs"].take()
+    serde_json::to_value(State::of(&app.session, &app.view)).expect("a state")["inputs"].take()
 }
 
 #[test]
@@ -25,7 +26,7 @@ fn a_session_plays_the_same() {
     input.play.fps = Some(2.0);
     input.play.latest.accumulate = true;
     let mut first = app_of(input, &context);
-    first.toggle_playing();
+    first.session.playing.clock.toggle();
     let clock = &mut first.session.playing.clock;
     clock.seek(0.5);
     clock.begin_here();
@@ -34,12 +35,12 @@ fn a_session_plays_the_same() {
     clock.seek(1.75);
     (clock.speed, clock.looped) = (0.25, false);
     // All four frames so far, accumulated.
-    until(&mut first, &context, "the fourth frame", |app| app.document().counts().points == 160);
-    let id = first.document().layers[0].id;
-    first.settle(|document| {
+    until(&mut first, "the fourth frame", |app| app.session.document().counts().points == 160);
+    let id = first.session.document().layers[0].id;
+    first.session.settle(|document| {
         document.set_tint(id, Some([1, 2, 3]));
     });
-    let kept = State::of(&first);
+    let kept = State::of(&first.session, &first.view);
     let path = folder.path().join("state.json");
     kept.write(&path).expect("written");
 
@@ -47,13 +48,13 @@ fn a_session_plays_the_same() {
     let clock = |app: &App| serde_json::to_string(&app.session.playing.clock).expect("a clock");
     assert_eq!(inputs(&second), inputs(&first), "all of it, even before anything is open");
     assert_eq!(clock(&second), clock(&first), "and when");
-    until(&mut second, &context, "the fourth frame", |app| app.document().counts().points == 160);
+    until(&mut second, "the fourth frame", |app| app.session.document().counts().points == 160);
     assert_eq!(clock(&second), clock(&first), "nor does time pass until then");
     assert_eq!(second.session.playing.clock.length(), 2.5, "at its own rate");
     assert_eq!(second.session.playing.frame(), Some((3, 5)));
-    assert_eq!(second.document().layers[0].tint, Some([1, 2, 3]), "in its colour");
+    assert_eq!(second.session.document().layers[0].tint, Some([1, 2, 3]), "in its colour");
     second.session.playing.step(true);
-    until(&mut second, &context, "the fifth frame", |app| app.document().counts().points == 200);
+    until(&mut second, "the fifth frame", |app| app.session.document().counts().points == 200);
 }
 
 #[test]
@@ -65,13 +66,13 @@ fn what_waits_or_failed_is_kept_as_it_is_to_look() {
     let mut input = Input::parse(&folder.path().display().to_string()).expect("a folder");
     input.world_from_input = autosplats::cloud::glam::DMat4::from_rotation_z(0.5);
     let appearance = Appearance { visible: false, tint: Some([9, 8, 7]) };
-    first.open_as(input, appearance);
-    let waiting = State::of(&first);
+    first.session.open_as(input, appearance);
+    let waiting = State::of(&first.session, &first.view);
     let path = folder.path().join("state.json");
     waiting.write(&path).expect("written");
     // The folder holds nothing that can be played.
-    until(&mut first, &context, "the failure", |app| app.session.playing.is_empty());
-    assert_eq!(State::of(&first), waiting, "what failed is no less a part of it");
+    until(&mut first, "the failure", |app| app.session.playing.is_empty());
+    assert_eq!(State::of(&first.session, &first.view), waiting, "what failed is no less a part of it");
     let second = again(&path, &context);
     assert_eq!(second.session.playing.waiting().next().map(|waiting| waiting.appearance), Some(appearance));
     assert_eq!(inputs(&second), inputs(&first), "nor is what still waits");

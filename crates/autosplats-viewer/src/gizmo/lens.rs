@@ -18,7 +18,7 @@ const EDGE_ON_SINE: f64 = 0.07;
 pub(super) type Ray = (DVec3, DVec3);
 
 /// Projection between world and window.
-pub(super) struct View {
+pub(super) struct WindowLens {
     lens: Lens,
     rect: Rect,
     /// Pixels per screen point.
@@ -27,8 +27,8 @@ pub(super) struct View {
     pub(super) forward: DVec3,
 }
 
-impl View {
-    /// The view of `camera` in a picture of `size` pixels, shown in `rect`.
+impl WindowLens {
+    /// The projection of `camera` in a picture of `size` pixels, shown in `rect`.
     pub(super) fn new(camera: &Camera, rect: Rect, size: [u32; 2]) -> Option<Self> {
         let lens = camera.lens(size).ok()?;
         let [_, _, forward] = camera.axes().ok()?;
@@ -147,11 +147,11 @@ pub(super) mod tests {
     pub(in crate::gizmo) const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
 
     /// A perspective and an orthographic view of [`FAR`].
-    pub(in crate::gizmo) fn views() -> impl Iterator<Item = View> {
+    pub(in crate::gizmo) fn views() -> impl Iterator<Item = WindowLens> {
         let rect = Rect::from_min_size(pos2(200.0, 30.0), vec2(600.0, 400.0));
         [Projection::PerspectiveFovDeg(40.0), Projection::OrthographicHeight(8.0)].into_iter().map(move |projection| {
             let camera = Camera { eye: FAR + DVec3::new(4.0, -10.0, 5.0), look_at: FAR, up: DVec3::Z, projection };
-            View::new(&camera, rect, [1200, 800]).expect("a camera that sees")
+            WindowLens::new(&camera, rect, [1200, 800]).expect("a camera that sees")
         })
     }
 
