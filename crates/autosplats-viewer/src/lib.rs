@@ -1,42 +1,26 @@
 //! A window that shows raw points as a lit surface.
 //!
-//! [`run`] opens the window. The window never waits: threads of their own read files (`loading`) and render pictures
-//! (`render`), and send their results. `app` holds the work of each window frame.
+//! [`run`] opens the window and returns when it is closed:
+//!
+//! ```no_run
+//! use autosplats_viewer::{Input, Options, run};
+//!
+//! run(Options { inputs: vec![Input::parse("scene:statue")?], ..Options::default() })?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # How it works
+//! `session` is what is open, `view` is the camera and its pictures, and `ui` is what the user touches. Each folder
+//! imports only those before it. `app` holds all three, and the work of each window frame. The window never waits:
+//! threads of their own read files and render pictures, and send their results.
 
-mod action;
-mod animation;
 mod app;
-mod commands;
-mod document;
-mod editing;
 mod files;
-mod gizmo;
-mod glance;
-mod kept;
-mod keys;
-mod legend;
-mod loading;
-mod look;
-mod measure;
 mod messages;
-mod navigation;
-mod opening;
-mod overlay;
-mod panels;
-mod playing;
-mod pointer;
-mod rate;
-mod recording;
-mod render;
-mod screen;
 mod session;
-mod state;
-mod storage;
 #[cfg(test)]
 mod tests;
 mod threads;
-mod tools;
-mod turns;
 mod ui;
 mod view;
 
@@ -45,7 +29,7 @@ use std::path::PathBuf;
 use autosplats::Backend;
 use eframe::egui;
 
-pub use self::loading::Input;
+pub use self::session::loading::Input;
 
 /// Options at the start of the viewer.
 #[derive(Debug, Default)]
@@ -78,7 +62,7 @@ pub enum Error {
 /// [`Error::Window`], and [`Error::State`] if the session file exists but is invalid.
 pub fn run(options: Options) -> Result<(), Error> {
     let path = options.state.as_deref().filter(|path| path.exists());
-    let state = path.map(state::State::read).transpose().map_err(Error::State)?;
+    let state = path.map(view::state::State::read).transpose().map_err(Error::State)?;
     let viewport = egui::ViewportBuilder::default()
         .with_app_id("autosplats")
         .with_title("autosplats")
@@ -89,12 +73,12 @@ pub fn run(options: Options) -> Result<(), Error> {
         eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, dithering: false, ..Default::default() };
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
         colors(&creation.egui_ctx);
-        let (look, recent) = storage::load(creation.storage);
+        let (look, recent) = view::storage::load(creation.storage);
         let mut app = app::App::new(options, look, recent, &creation.egui_ctx);
         app.view.format = creation.wgpu_render_state.as_ref().map(|state| state.target_format);
-        app.view.turns = turns::are_taken(creation).then(Default::default);
+        app.view.turns = view::turns::are_taken(creation).then(Default::default);
         if let Some(state) = state {
-            let folder = app.session.file.as_deref().map(state::folder).unwrap_or_default();
+            let folder = app.session.file.as_deref().map(view::state::folder).unwrap_or_default();
             state.restore(&mut app.session, &mut app.view, &folder);
         }
         Ok(Box::new(app))

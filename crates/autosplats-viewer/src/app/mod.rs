@@ -5,14 +5,15 @@ mod picture;
 
 use eframe::egui;
 
-use crate::kept::StoredInput;
-use crate::look::Look;
-use crate::render::{Outcome, Purpose};
+use crate::Options;
 use crate::session::Session;
-use crate::state::State;
+use crate::session::kept::StoredInput;
 use crate::ui::Ui;
 use crate::view::View;
-use crate::{Options, storage};
+use crate::view::look::Look;
+use crate::view::render::{Outcome, Purpose};
+use crate::view::state::State;
+use crate::view::storage;
 
 /// The state of the viewer.
 pub(crate) struct App {

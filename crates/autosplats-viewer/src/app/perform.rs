@@ -5,10 +5,10 @@ use autosplats::{Camera, ViewDirection};
 use eframe::egui;
 
 use super::App;
-use crate::action::Action;
-use crate::commands::{Command, Tool};
-use crate::document::{Document, LayerId};
-use crate::panels::Pose;
+use crate::session::document::{Document, LayerId};
+use crate::ui::action::Action;
+use crate::ui::commands::{Command, Tool};
+use crate::ui::panels::Pose;
 
 impl App {
     /// Performs all actions.

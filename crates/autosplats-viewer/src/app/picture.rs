@@ -3,10 +3,11 @@
 use eframe::egui;
 
 use super::App;
-use crate::commands::Tool;
-use crate::panels::welcome;
 use crate::ui::Ui;
-use crate::{legend, overlay};
+use crate::ui::commands::Tool;
+use crate::ui::panels::welcome;
+use crate::view::legend;
+use crate::view::overlay;
 
 impl App {
     /// Shows the picture and handles the mouse.

@@ -1,5 +1,14 @@
 //! The session: what is open, and how it is edited, read and played. It knows no camera and draws nothing.
 
+pub(crate) mod document;
+pub(crate) mod editing;
+pub(crate) mod glance;
+pub(crate) mod kept;
+pub(crate) mod loading;
+pub(crate) mod measure;
+pub(crate) mod opening;
+pub(crate) mod playing;
+
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -7,15 +16,15 @@ use autosplats::cloud::Axes;
 use autosplats::cloud::glam::DVec3;
 use eframe::egui;
 
-use crate::document::{ClipBox, History, LayerId};
-use crate::editing::CachedCounts;
-use crate::glance::FirstLook;
-use crate::kept::StoredInput;
-use crate::loading::{Appearance, Input, JobId, Loader, Watch};
-use crate::measure::Ruler;
+use self::document::{ClipBox, History, LayerId};
+use self::editing::CachedCounts;
+use self::glance::FirstLook;
+use self::kept::StoredInput;
+use self::loading::{Appearance, Input, JobId, Loader, Watch};
+use self::measure::Ruler;
+use self::opening::{Arrival, JobTarget};
+use self::playing::Playing;
 use crate::messages::MessageSender;
-use crate::opening::{Arrival, JobTarget};
-use crate::playing::Playing;
 
 /// What is open.
 pub(crate) struct Session {

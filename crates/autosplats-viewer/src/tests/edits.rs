@@ -1,7 +1,7 @@
 //! Selecting, deleting, undoing, and leaving.
 
 use super::*;
-use crate::document::Counts;
+use crate::session::document::Counts;
 
 fn counts(window: &Window) -> Counts {
     window.app().session.document().counts()

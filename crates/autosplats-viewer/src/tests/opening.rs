@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use autosplats::Camera;
 
 use super::*;
-use crate::kept::StoredInput;
-use crate::storage;
+use crate::session::kept::StoredInput;
+use crate::view::storage;
 
 #[test]
 fn a_scene_is_shown_and_listed() {
@@ -16,7 +16,7 @@ fn a_scene_is_shown_and_listed() {
     assert_eq!(app.session.document().layers.len(), 1, "one thing is open");
     assert!(window.says(STATUE), "its name is in the list: {:?}", window.words());
     let points = app.session.document().layers[0].cloud.len();
-    assert!(window.says(&format!("{} points", crate::document::grouped(points))), "and its number of points");
+    assert!(window.says(&format!("{} points", crate::session::document::grouped(points))), "and its number of points");
     let [width, height] = shot.size;
     let share = shot.counts.covered as f64 / f64::from(width * height);
     // The first view of the statue fills about half of the picture.
@@ -123,8 +123,9 @@ fn played() -> Input {
 fn settings_are_kept_between_starts() {
     let mut window = Window::new(&[]);
     window.harness.state_mut().view.look.dot_size = 6;
-    window.harness.state_mut().view.look.two_fingers = crate::look::TwoFingers::Pan;
-    window.harness.state_mut().session.recent = vec![StoredInput::of(&played(), crate::loading::Appearance::default())];
+    window.harness.state_mut().view.look.two_fingers = crate::view::look::TwoFingers::Pan;
+    window.harness.state_mut().session.recent =
+        vec![StoredInput::of(&played(), crate::session::loading::Appearance::default())];
     let mut memory = Memory::default();
     storage::save(&window.app().session, &window.app().view, &mut memory);
     let (look, recent) = storage::load(Some(&memory));

@@ -1,12 +1,20 @@
 //! What the user sees and touches around the picture: panels, tools and messages.
 
+pub(crate) mod action;
+pub(crate) mod commands;
+pub(crate) mod gizmo;
+pub(crate) mod keys;
+pub(crate) mod panels;
+pub(crate) mod pointer;
+pub(crate) mod tools;
+
 use eframe::egui;
 
-use crate::keys::Keys;
+use self::keys::Keys;
+use self::panels::Panels;
+use self::pointer::Pointer;
+use self::tools::Tools;
 use crate::messages::Messages;
-use crate::panels::Panels;
-use crate::pointer::Pointer;
-use crate::tools::Tools;
 
 /// Panels, tools and messages.
 pub(crate) struct Ui {

@@ -6,9 +6,9 @@ use autosplats::{Camera, Projection, ViewDirection};
 use autosplats_sources::Source;
 
 use super::View;
-use crate::glance::{FOV_DEG, ViewFrame};
-use crate::opening::Arrival;
 use crate::session::Session;
+use crate::session::glance::{FOV_DEG, ViewFrame};
+use crate::session::opening::Arrival;
 
 impl View {
     /// Receives that points have arrived. The camera moves to show them if they are the first ones, or if the user has

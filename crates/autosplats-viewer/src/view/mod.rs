@@ -1,23 +1,35 @@
 //! The view: the camera, and the pictures that the render thread makes for it.
 
+pub(crate) mod animation;
 mod camera;
+pub(crate) mod legend;
+pub(crate) mod look;
+pub(crate) mod navigation;
 mod output;
+pub(crate) mod overlay;
 mod pictures;
+pub(crate) mod rate;
+pub(crate) mod recording;
+pub(crate) mod render;
+pub(crate) mod screen;
+pub(crate) mod state;
+pub(crate) mod storage;
+pub(crate) mod turns;
 
 use std::sync::Arc;
 
 use autosplats::{AdapterSummary, Camera};
 use eframe::egui::{self, Color32, Sense};
 
+use self::look::Look;
+use self::navigation::Navigation;
 use self::pictures::RequestKey;
-use crate::look::Look;
+use self::rate::Rate;
+use self::recording::Recording;
+use self::render::{Picture, RenderThread};
+use self::screen::OnScreen;
+use self::turns::Turns;
 use crate::messages::MessageSender;
-use crate::navigation::Navigation;
-use crate::rate::Rate;
-use crate::recording::Recording;
-use crate::render::{Picture, RenderThread};
-use crate::screen::OnScreen;
-use crate::turns::Turns;
 
 /// The camera and its pictures.
 pub(crate) struct View {

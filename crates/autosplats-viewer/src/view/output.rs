@@ -6,8 +6,8 @@ use autosplats::Image;
 
 use super::View;
 use crate::files;
-use crate::render::{Goal, Task};
 use crate::threads::spawn;
+use crate::view::render::{Goal, Task};
 
 impl View {
     /// Hands a picture to its goal. `range` is the value range of its colours.

@@ -7,11 +7,11 @@ use autosplats::cloud::Axes;
 use eframe::egui;
 
 use super::View;
-use crate::document::ShownCloud;
-use crate::look::Look;
-use crate::navigation::Flight;
-use crate::render::{Answer, Outcome, Purpose, RenderRequest, Task};
 use crate::session::Session;
+use crate::session::document::ShownCloud;
+use crate::view::look::Look;
+use crate::view::navigation::Flight;
+use crate::view::render::{Answer, Outcome, Purpose, RenderRequest, Task};
 
 /// Seconds from the last movement until the whole picture is rendered.
 const REST_DELAY_S: f64 = 0.12;

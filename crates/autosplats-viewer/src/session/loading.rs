@@ -1,0 +1,368 @@
+//! Reads inputs on threads of their own: points are shown as they arrive, and changed files are read again.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use autosplats::cloud::glam::DMat4;
+use autosplats::cloud::{Error, PointCloud, Progress};
+use autosplats_formats::ReadOptions;
+use autosplats_sources::{PlayOptions, Source};
+use eframe::egui;
+
+use crate::session::glance::{FirstLook, SharedViewFrame, ViewFrame};
+use crate::threads::spawn;
+
+/// Largest number of points shown before a file is read to its end.
+const PREVIEW_POINTS: usize = 4_000_000;
+/// Time between two checks of a watched file. The file is read again when two successive checks see the same change.
+const WATCH_INTERVAL: Duration = Duration::from_millis(400);
+
+/// Identifies a reading job.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct JobId(u64);
+
+/// Something to open.
+#[derive(Clone, Debug)]
+pub struct Input {
+    /// Name in the list of inputs.
+    pub name: String,
+    /// Where the points come from.
+    pub source: Source,
+    /// How to read the input.
+    pub options: ReadOptions,
+    /// How to play the input.
+    pub play: PlayOptions,
+    /// Whether the input is played though its source may be static.
+    pub played: bool,
+    /// From the input's own to world coordinates.
+    pub world_from_input: DMat4,
+}
+
+impl Input {
+    /// Parses a name: a scene, a file or an address, with default options and the identity as its pose.
+    ///
+    /// # Errors
+    /// [`Error::UnknownScene`] and [`Error::BadScene`].
+    pub fn parse(name: &str) -> Result<Self, Error> {
+        let source = Source::parse(name)?;
+        let name = source.short_name().unwrap_or_else(|| name.into());
+        Ok(Self::usual(name, source))
+    }
+
+    /// A file that was dropped or chosen in a dialog.
+    pub(crate) fn file(path: PathBuf) -> Self {
+        let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
+        let source = Source::parse(&path.display().to_string()).unwrap_or(Source::File(path));
+        Self::usual(name, source)
+    }
+
+    /// An input with default options and the identity as its pose.
+    fn usual(name: String, source: Source) -> Self {
+        let (options, play) = (ReadOptions::default(), PlayOptions::default());
+        Self { name, source, options, play, played: false, world_from_input: DMat4::IDENTITY }
+    }
+
+    /// Name of the source, as a user could type it.
+    pub(crate) fn source_name(&self) -> String {
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string();
+        match &self.source {
+            Source::File(path) | Source::Recording(path) => absolute(path),
+            Source::Sequence(name) => absolute(Path::new(name)),
+            Source::Remote(address) => address.clone(),
+            Source::Scene(..) | Source::StandardInput => self.name.clone(),
+        }
+    }
+
+    /// Whether the points change over time.
+    pub(crate) fn moves(&self) -> bool {
+        self.played || self.source.moves()
+    }
+}
+
+/// How an input is shown once it has points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Appearance {
+    pub(crate) visible: bool,
+    /// One colour for all points; `None` shows their own colours.
+    pub(crate) tint: Option<[u8; 3]>,
+}
+
+impl Default for Appearance {
+    fn default() -> Self {
+        Self { visible: true, tint: None }
+    }
+}
+
+/// What happened to a job.
+pub(crate) enum JobNews {
+    /// Part of the points, shown until all have arrived.
+    Preview(Arc<PointCloud>, FirstLook),
+    /// All points, and the reader's notes.
+    Read(Arc<PointCloud>, FirstLook, Vec<String>),
+    /// Why reading failed.
+    Failed(String),
+    /// The job was cancelled.
+    Cancelled,
+}
+
+/// A job that reads an input.
+pub(crate) struct Job {
+    pub(crate) id: JobId,
+    pub(crate) input: Input,
+    state: Arc<State>,
+}
+
+/// State shared by the reader and the window.
+#[derive(Default)]
+struct State {
+    /// Progress, in 65,536ths.
+    done: AtomicU32,
+    cancelled: AtomicBool,
+}
+
+impl Job {
+    /// Progress, 0 to 1.
+    pub(crate) fn fraction(&self) -> f32 {
+        self.state.done.load(Ordering::Relaxed) as f32 / 65_536.0
+    }
+
+    /// Cancels the job; the reader stops at its next check.
+    pub(crate) fn cancel(&self) {
+        self.state.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Reads inputs one after the other, since each is read by all cores.
+pub(crate) struct Loader {
+    context: egui::Context,
+    /// The shape and the up axis of the window's picture.
+    pub(crate) frame: SharedViewFrame,
+    orders: Sender<Order>,
+    receiver: Receiver<(JobId, JobNews)>,
+    changes: (Sender<PathBuf>, Receiver<PathBuf>),
+    jobs: Vec<Job>,
+    next: u64,
+}
+
+struct Order {
+    id: JobId,
+    input: Input,
+    state: Arc<State>,
+}
+
+impl Loader {
+    /// Starts the reading thread. `context` is asked for a repaint with each piece of news.
+    pub(crate) fn start(context: egui::Context) -> Self {
+        let (orders, queue) = channel::<Order>();
+        let (sender, receiver) = channel();
+        let asked = context.clone();
+        let frame = SharedViewFrame::new(ViewFrame { aspect: 1.5, up: None });
+        let known = frame.clone();
+        spawn("read", move || {
+            for order in queue {
+                let work = std::panic::AssertUnwindSafe(|| read(&order, &known, &sender, &asked));
+                let read = std::panic::catch_unwind(work);
+                // A panic in one file must not stop the following files.
+                let news = read.unwrap_or_else(|_| {
+                    JobNews::Failed(format!("{}: reading failed, which is a bug in this program", order.input.name))
+                });
+                let _ = sender.send((order.id, news));
+                asked.request_repaint();
+            }
+        });
+        Self { context, frame, orders, receiver, changes: channel(), jobs: Vec::new(), next: 0 }
+    }
+
+    pub(crate) fn context(&self) -> &egui::Context {
+        &self.context
+    }
+
+    /// Queues an input and returns the number of its job.
+    pub(crate) fn read(&mut self, input: Input) -> JobId {
+        self.next += 1;
+        let id = JobId(self.next);
+        let state = Arc::new(State::default());
+        self.jobs.push(Job { id, input: input.clone(), state: Arc::clone(&state) });
+        let _ = self.orders.send(Order { id, input, state });
+        id
+    }
+
+    /// Jobs in progress and waiting, in order.
+    pub(crate) fn jobs(&self) -> &[Job] {
+        &self.jobs
+    }
+
+    pub(crate) fn cancel(&self, id: JobId) {
+        self.jobs.iter().filter(|job| job.id == id).for_each(Job::cancel);
+    }
+
+    pub(crate) fn cancel_all(&self) {
+        self.jobs.iter().for_each(Job::cancel);
+    }
+
+    /// The news since the last call. Jobs that have ended are dropped, so each one's last news is returned once.
+    pub(crate) fn news(&mut self) -> Vec<(Input, JobId, JobNews)> {
+        let news: Vec<_> = self.receiver.try_iter().collect();
+        let mut told = Vec::new();
+        for (id, news) in news {
+            let Some(at) = self.jobs.iter().position(|job| job.id == id) else { continue };
+            let input = self.jobs[at].input.clone();
+            let cancelled = self.jobs[at].state.cancelled.load(Ordering::Relaxed);
+            if matches!(news, JobNews::Read(..) | JobNews::Failed(_) | JobNews::Cancelled) {
+                self.jobs.remove(at);
+            }
+            // A job that finished before the reader saw the cancellation counts as cancelled.
+            match news {
+                JobNews::Preview(..) if cancelled => {}
+                JobNews::Read(..) if cancelled => told.push((input, id, JobNews::Cancelled)),
+                news => told.push((input, id, news)),
+            }
+        }
+        told
+    }
+
+    /// Watches a file for changes until the returned value is dropped.
+    pub(crate) fn watch(&self, path: PathBuf) -> Watch {
+        let alive = Arc::new(());
+        let watched = Arc::downgrade(&alive);
+        let (sender, context) = (self.changes.0.clone(), self.context.clone());
+        spawn("watch", move || {
+            let stamp = || std::fs::metadata(&path).ok().map(|data| (data.modified().ok(), data.len()));
+            let mut known = stamp();
+            let mut pending = None;
+            while watched.upgrade().is_some() {
+                std::thread::sleep(WATCH_INTERVAL);
+                let now = stamp();
+                if now == known || now.is_none() {
+                    pending = None;
+                } else if pending != Some(now) {
+                    // The file may still be written; the next check decides.
+                    pending = Some(now);
+                } else {
+                    known = now;
+                    pending = None;
+                    let _ = sender.send(path.clone());
+                    context.request_repaint();
+                }
+            }
+        });
+        Watch { _alive: alive }
+    }
+
+    /// Files that have changed since the last call.
+    pub(crate) fn changed(&self) -> impl Iterator<Item = PathBuf> + '_ {
+        self.changes.1.try_iter()
+    }
+}
+
+/// Keeps a file watched while alive.
+pub(crate) struct Watch {
+    _alive: Arc<()>,
+}
+
+fn read(order: &Order, frame: &SharedViewFrame, sender: &Sender<(JobId, JobNews)>, context: &egui::Context) -> JobNews {
+    if order.state.cancelled.load(Ordering::Relaxed) {
+        return JobNews::Cancelled;
+    }
+    let follower = Follower { order, frame, sender, context, notes: Mutex::default(), preview: Mutex::default() };
+    let options = ReadOptions { exact: true, ..order.input.options.clone() };
+    match order.input.source.read(&options, &follower) {
+        Ok(cloud) if cloud.is_empty() => JobNews::Failed(format!("{}: there are no points in it", order.input.name)),
+        Ok(cloud) => {
+            let notes = follower.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
+            let cloud = Arc::new(cloud);
+            let glance = FirstLook::of(&order.input, &cloud, frame.get());
+            JobNews::Read(cloud, glance, notes)
+        }
+        Err(Error::Cancelled) => JobNews::Cancelled,
+        Err(error) => JobNews::Failed(error.to_string()),
+    }
+}
+
+/// Receives progress, notes and points from a reader.
+struct Follower<'a> {
+    order: &'a Order,
+    frame: &'a SharedViewFrame,
+    sender: &'a Sender<(JobId, JobNews)>,
+    context: &'a egui::Context,
+    notes: Mutex<Vec<String>>,
+    preview: Mutex<Preview>,
+}
+
+/// The points read so far.
+#[derive(Default)]
+struct Preview {
+    parts: Vec<PointCloud>,
+    /// Number of points in `parts`.
+    points: usize,
+    /// Number of points shown last.
+    shown: usize,
+    /// Keeps one of `step` points.
+    step: usize,
+}
+
+impl Preview {
+    /// Adds points. Returns all points so far once there are 1.5 times as many as shown last, so that merging costs no
+    /// more than reading.
+    fn add(&mut self, mut points: PointCloud) -> Option<PointCloud> {
+        self.step = self.step.max(1);
+        let step = self.step;
+        points.retain(|index| index % step == 0);
+        self.points += points.len();
+        self.parts.push(points);
+        if self.points > PREVIEW_POINTS {
+            self.step *= 2;
+            self.parts.iter_mut().for_each(|part| part.retain(|index| index % 2 == 0));
+            self.points = self.parts.iter().map(PointCloud::len).sum();
+            self.shown /= 2;
+        }
+        if self.points * 2 < self.shown * 3 {
+            return None;
+        }
+        self.shown = self.points;
+        let whole = PointCloud::merge(
+            std::mem::take(&mut self.parts).into_iter().map(|part| (part, DMat4::IDENTITY)).collect(),
+        );
+        self.parts.push(whole.clone());
+        Some(whole)
+    }
+}
+
+impl Progress for Follower<'_> {
+    fn report(&self, fraction: f32) {
+        let done = (fraction.clamp(0.0, 1.0) * 65_536.0) as u32;
+        let before = self.order.state.done.swap(done, Ordering::Relaxed);
+        // A progress bar 100 pixels long needs 100 repaints.
+        if before / 656 != done / 656 {
+            self.context.request_repaint();
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.order.state.cancelled.load(Ordering::Relaxed)
+    }
+
+    fn note(&self, note: &str) {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.into());
+    }
+
+    fn wants_chunks(&self) -> bool {
+        true
+    }
+
+    fn chunk(&self, points: PointCloud) {
+        let mut preview = self.preview.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cloud) = preview.add(points) {
+            let cloud = Arc::new(cloud);
+            let glance = FirstLook::of(&self.order.input, &cloud, self.frame.get());
+            let _ = self.sender.send((self.order.id, JobNews::Preview(cloud, glance)));
+            self.context.request_repaint();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
