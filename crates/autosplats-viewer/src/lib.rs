@@ -29,7 +29,7 @@ use std::path::PathBuf;
 use autosplats::Backend;
 use eframe::egui;
 
-pub use self::session::loading::Input;
+pub use self::session::Input;
 
 /// Options at the start of the viewer.
 #[derive(Debug, Default)]

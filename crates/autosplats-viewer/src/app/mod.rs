@@ -6,14 +6,10 @@ mod picture;
 use eframe::egui;
 
 use crate::Options;
-use crate::session::Session;
-use crate::session::kept::StoredInput;
+use crate::session::{Session, StoredInput};
 use crate::ui::Ui;
-use crate::view::View;
-use crate::view::look::Look;
-use crate::view::render::{Outcome, Purpose};
-use crate::view::state::State;
 use crate::view::storage;
+use crate::view::{Look, Outcome, Purpose, State, View};
 
 /// The state of the viewer.
 pub(crate) struct App {

@@ -5,10 +5,8 @@ use autosplats::{Camera, ViewDirection};
 use eframe::egui;
 
 use super::App;
-use crate::session::document::{Document, LayerId};
-use crate::ui::action::Action;
-use crate::ui::commands::{Command, Tool};
-use crate::ui::panels::Pose;
+use crate::session::{Document, LayerId};
+use crate::ui::{Action, Command, Pose, Tool};
 
 impl App {
     /// Performs all actions.
@@ -31,33 +29,23 @@ impl App {
             Action::GiveUpWaiting(number) => session.playing.give_up(number),
             Action::Remove(ids) => self.remove(ids),
             Action::RemoveEdited(ids) => session.remove(&ids),
-            Action::SetVisible(id, visible) => session.settle(|document| {
-                document.set_visible(id, visible);
-            }),
+            Action::SetVisible(id, visible) => session.settle(|document| document.set_visible(id, visible)),
             Action::ShowOnly(id) => session.settle(|document| {
                 let ids: Vec<_> = document.layers.iter().map(|layer| layer.id).collect();
                 for other in ids {
                     document.set_visible(other, other == id);
                 }
             }),
-            Action::SetTint(id, tint) => session.settle(|document| {
-                document.set_tint(id, tint);
-            }),
-            Action::Rename(id, name) => session.edit("Rename an input", |document| {
-                document.rename(id, &name);
-            }),
-            Action::Reorder(id, to) => session.edit("Reorder the inputs", |document| {
-                document.reorder(id, to);
-            }),
+            Action::SetTint(id, tint) => session.settle(|document| document.set_tint(id, tint)),
+            Action::Rename(id, name) => session.edit("Rename an input", |document| document.rename(id, &name)),
+            Action::Reorder(id, to) => session.edit("Reorder the inputs", |document| document.reorder(id, to)),
             Action::Place(id) => ui.panels.pose = session.document().layer(id).map(Pose::of),
             Action::PreviewPose { layer, pose } => {
                 session.change(|document| document.set_pose(layer, pose));
             }
             Action::SettlePose { layer, before, made } => {
                 session.change(|document| document.set_pose(layer, before));
-                session.edit("Place an input", |document| {
-                    document.set_pose(layer, made);
-                });
+                session.edit("Place an input", |document| document.set_pose(layer, made));
                 view.measure_scene(session);
             }
             Action::PreviewClip(clip) => session.preview_clip(clip),

@@ -3,9 +3,8 @@
 use eframe::egui;
 
 use super::App;
-use crate::ui::Ui;
-use crate::ui::commands::Tool;
 use crate::ui::panels::welcome;
+use crate::ui::{Tool, Ui};
 use crate::view::legend;
 use crate::view::overlay;
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use autosplats::cloud::PointCloud;
 
-use crate::session::Session;
-use crate::session::document::{ClipBox, Counts, Document, LayerId, label};
+use crate::session::document::label;
+use crate::session::{ClipBox, Counts, Document, LayerId, Session};
 
 /// Counts that panels show, for one version of the document.
 #[derive(Default)]
@@ -47,7 +47,7 @@ impl Session {
     }
 
     /// Changes the document as an undo step.
-    pub(crate) fn edit(&mut self, label: impl Into<String>, edit: impl FnOnce(&mut Document)) {
+    pub(crate) fn edit<T>(&mut self, label: impl Into<String>, edit: impl FnOnce(&mut Document) -> T) {
         let mut document = self.document().clone();
         edit(&mut document);
         self.history.record(label, document);
@@ -75,7 +75,7 @@ impl Session {
 
     /// Changes the document and its whole history, for changes that undo must keep: files that come and go, and
     /// visibility.
-    pub(crate) fn settle(&mut self, change: impl Fn(&mut Document)) {
+    pub(crate) fn settle<T>(&mut self, change: impl Fn(&mut Document) -> T) {
         self.history.everywhere(change);
         self.version += 1;
     }

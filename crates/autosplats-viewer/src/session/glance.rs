@@ -7,8 +7,8 @@ use autosplats::cloud::glam::DVec3;
 use autosplats::cloud::{Axes, PointCloud};
 use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 
-use crate::session::document::{Document, Layer, bounds_of};
-use crate::session::loading::Input;
+use crate::session::document::bounds_of;
+use crate::session::{Document, Input, Layer};
 
 /// Vertical field of view of the first picture, degrees.
 pub(crate) const FOV_DEG: f64 = 40.0;

@@ -9,7 +9,7 @@ use autosplats_formats::{DepthCamera, ReadOptions};
 use autosplats_sources::{LatestOptions, PlayOptions, Source};
 use serde::{Deserialize, Serialize};
 
-use crate::session::loading::{Appearance, Input};
+use crate::session::{Appearance, Input};
 
 /// An input as stored in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,13 +1,14 @@
 //! The session: what is open, and how it is edited, read and played. It knows no camera and draws nothing.
 
 pub(crate) mod document;
-pub(crate) mod editing;
-pub(crate) mod glance;
-pub(crate) mod kept;
-pub(crate) mod loading;
+mod editing;
+mod glance;
+mod input;
+mod kept;
+mod loading;
 pub(crate) mod measure;
-pub(crate) mod opening;
-pub(crate) mod playing;
+mod opening;
+mod playing;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -16,14 +17,19 @@ use autosplats::cloud::Axes;
 use autosplats::cloud::glam::DVec3;
 use eframe::egui;
 
-use self::document::{ClipBox, History, LayerId};
-use self::editing::CachedCounts;
-use self::glance::FirstLook;
-use self::kept::StoredInput;
-use self::loading::{Appearance, Input, JobId, Loader, Watch};
-use self::measure::Ruler;
-use self::opening::{Arrival, JobTarget};
-use self::playing::Playing;
+pub(crate) use self::document::{
+    ClipBox, Counts, Document, ExportError, ExportScope, Exported, Grip, History, Layer, LayerId, PickedPoint, Region,
+    Replace, SelectMode, ShownCloud,
+};
+pub(crate) use self::editing::CachedCounts;
+pub(crate) use self::glance::{FOV_DEG, FirstLook, SharedViewFrame, ViewFrame};
+pub(crate) use self::input::Appearance;
+pub use self::input::Input;
+pub(crate) use self::kept::StoredInput;
+pub(crate) use self::loading::{JobId, JobNews, Loader, Watch};
+pub(crate) use self::measure::Ruler;
+pub(crate) use self::opening::{Arrival, JobTarget};
+pub(crate) use self::playing::{Clock, Playing, Reel, SPEEDS, WaitingInput};
 use crate::messages::MessageSender;
 
 /// What is open.
@@ -31,19 +37,19 @@ pub(crate) struct Session {
     pub(crate) history: History,
     /// Version of the document; every change increases it.
     pub(crate) version: u64,
-    pub(crate) counted: CachedCounts,
+    counted: CachedCounts,
     /// The clipping box before the unfinished change; the inner `None` is no box.
-    pub(crate) clip_before: Option<Option<ClipBox>>,
+    clip_before: Option<Option<ClipBox>>,
     pub(crate) loader: Loader,
     /// What the points of each job are for.
-    pub(crate) jobs: HashMap<JobId, JobTarget>,
+    jobs: HashMap<JobId, JobTarget>,
     /// The watched files, which are read again when they change; `None` watches none.
-    pub(crate) watches: Option<HashMap<PathBuf, Watch>>,
+    watches: Option<HashMap<PathBuf, Watch>>,
     pub(crate) playing: Playing,
     /// The input that each layer was read from.
     pub(crate) inputs: HashMap<LayerId, Input>,
     /// Inputs that could not be read. A session keeps them.
-    pub(crate) failed: Vec<(Input, Appearance)>,
+    failed: Vec<(Input, Appearance)>,
     /// Recently opened inputs, newest first.
     pub(crate) recent: Vec<StoredInput>,
     /// File of the session, written on exit.
@@ -54,7 +60,7 @@ pub(crate) struct Session {
     /// What the reading thread found about the only open input, and the document version that this holds for.
     pub(crate) glance: Option<(u64, FirstLook)>,
     /// The points that have arrived since the view was told.
-    pub(crate) arrival: Arrival,
+    arrival: Arrival,
     pub(crate) messages: MessageSender,
 }
 

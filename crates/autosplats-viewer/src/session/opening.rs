@@ -6,11 +6,7 @@ use std::sync::Arc;
 use autosplats::cloud::PointCloud;
 use autosplats_sources::Source;
 
-use crate::session::Session;
-use crate::session::document::{Layer, LayerId};
-use crate::session::glance::FirstLook;
-use crate::session::kept::StoredInput;
-use crate::session::loading::{Appearance, Input, JobId, JobNews};
+use crate::session::{Appearance, FirstLook, Input, JobId, JobNews, Layer, LayerId, Session, StoredInput};
 
 /// Number of recent inputs kept.
 const MAX_RECENT_INPUTS: usize = 12;
@@ -175,9 +171,7 @@ impl Session {
         // Forgets the inputs of layers that undo can no longer bring back.
         self.inputs.retain(|&known, _| self.history.holds(known));
         self.inputs.insert(id, input.clone());
-        self.settle(|document| {
-            document.add(layer.clone());
-        });
+        self.settle(|document| document.add(layer.clone()));
         id
     }
 
@@ -208,9 +202,7 @@ impl Session {
             Some(JobTarget::Growing(id)) => {
                 let layer = self.document().layer(id);
                 let appearance = layer.map(|layer| Appearance { visible: layer.visible, tint: layer.tint });
-                self.settle(|document| {
-                    document.remove(id);
-                });
+                self.settle(|document| document.remove(id));
                 appearance.unwrap_or_default()
             }
             Some(JobTarget::Again(_)) | None => Appearance::default(),
@@ -220,9 +212,7 @@ impl Session {
     /// Cancels a layer that is still being read or played.
     pub(crate) fn give_up(&mut self, id: LayerId) {
         if self.playing.stop(id) {
-            self.settle(|document| {
-                document.remove(id);
-            });
+            self.settle(|document| document.remove(id));
         }
         let grows = |target: &JobTarget| matches!(target, JobTarget::Growing(layer) if *layer == id);
         let job = self.jobs.iter().find_map(|(&job, target)| grows(target).then_some(job));

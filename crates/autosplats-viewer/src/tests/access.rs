@@ -1,7 +1,7 @@
 //! Everything has a name and fits into a small window.
 
 use super::*;
-use crate::ui::commands::{Command, Tool};
+use crate::ui::{Command, Tool};
 
 #[test]
 fn everything_that_can_be_used_has_a_name() {

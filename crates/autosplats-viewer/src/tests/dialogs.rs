@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use super::*;
-use crate::ui::commands::Command;
+use crate::ui::Command;
 
 /// Opens a dialog and types the output file.
 fn ask(window: &mut Window, command: Command, path: &Path) {

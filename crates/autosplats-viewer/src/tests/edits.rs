@@ -1,7 +1,7 @@
 //! Selecting, deleting, undoing, and leaving.
 
 use super::*;
-use crate::session::document::Counts;
+use crate::session::Counts;
 
 fn counts(window: &Window) -> Counts {
     window.app().session.document().counts()

@@ -22,7 +22,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use crate::app::App;
-use crate::view::look::Look;
+use crate::view::Look;
 use crate::{Input, Options};
 
 /// The smallest window in which everything has to work.

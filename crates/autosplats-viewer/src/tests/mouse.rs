@@ -4,7 +4,7 @@ use autosplats::Camera;
 use autosplats::cloud::glam::{DVec2, DVec3};
 
 use super::*;
-use crate::ui::commands::Tool;
+use crate::ui::Tool;
 
 /// Position of a world position in the picture, by shares of its sides.
 fn share(window: &Window, camera: &Camera, world: DVec3) -> DVec2 {
@@ -163,7 +163,7 @@ fn scroll(window: &mut Window, unit: egui::MouseWheelUnit, source: egui::MouseWh
 
 #[test]
 fn two_fingers_do_what_was_chosen_and_a_wheel_zooms() {
-    use crate::view::look::TwoFingers;
+    use crate::view::TwoFingers;
     use egui::{MouseWheelSource as Source, MouseWheelUnit as Unit};
     let mut window = Window::with_statue();
     let first = camera(&window);

@@ -5,7 +5,7 @@ use std::path::Path;
 use autosplats_sources::Source;
 
 use super::*;
-use crate::ui::commands::Command;
+use crate::ui::Command;
 
 /// Frames of 400 points each. Each frame is shifted to the right of the one before.
 fn frames(folder: &Path, count: usize) -> Input {

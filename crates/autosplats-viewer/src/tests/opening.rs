@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use autosplats::Camera;
 
 use super::*;
-use crate::session::kept::StoredInput;
+use crate::session::StoredInput;
 use crate::view::storage;
 
 #[test]
@@ -123,9 +123,8 @@ fn played() -> Input {
 fn settings_are_kept_between_starts() {
     let mut window = Window::new(&[]);
     window.harness.state_mut().view.look.dot_size = 6;
-    window.harness.state_mut().view.look.two_fingers = crate::view::look::TwoFingers::Pan;
-    window.harness.state_mut().session.recent =
-        vec![StoredInput::of(&played(), crate::session::loading::Appearance::default())];
+    window.harness.state_mut().view.look.two_fingers = crate::view::TwoFingers::Pan;
+    window.harness.state_mut().session.recent = vec![StoredInput::of(&played(), crate::session::Appearance::default())];
     let mut memory = Memory::default();
     storage::save(&window.app().session, &window.app().view, &mut memory);
     let (look, recent) = storage::load(Some(&memory));

@@ -5,7 +5,7 @@ use autosplats::cloud::glam::DVec3;
 use autosplats::{Camera, ViewDirection};
 
 use super::*;
-use crate::ui::commands::Command;
+use crate::ui::Command;
 
 /// Presses the shortcut of a command. The clipboard's keys arrive as events of their own.
 fn give(window: &mut Window, command: Command) {
@@ -62,7 +62,7 @@ fn check(window: &mut Window, command: Command) {
             // Half of the points, selected without waiting for a picture.
             window.harness.state_mut().session.change(|document| {
                 let shown = document.shown();
-                document.select(&shown, |index| index % 2 == 0, crate::session::document::SelectMode::Replace);
+                document.select(&shown, |index| index % 2 == 0, crate::session::SelectMode::Replace);
             });
         }
         _ => {}
@@ -276,7 +276,7 @@ fn f6_goes_round_the_window_and_tab_through_a_panel() {
     let selected = |window: &Window| window.app().session.document().counts().selected;
     window.harness.state_mut().session.change(|document| {
         let shown = document.shown();
-        document.select(&shown, |_| true, crate::session::document::SelectMode::Replace);
+        document.select(&shown, |_| true, crate::session::SelectMode::Replace);
     });
     window.press(Key::Escape);
     assert_eq!(focused(&window), None, "Escape gives the keyboard back to the picture");

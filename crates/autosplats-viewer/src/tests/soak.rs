@@ -1,7 +1,7 @@
 //! Random input in random order: nothing may panic, and memory may not grow.
 
 use super::*;
-use crate::ui::commands::Command;
+use crate::ui::Command;
 
 /// A reproducible sequence of random numbers (xorshift64*, Vigna 2016).
 struct Chance(u64);
@@ -118,7 +118,7 @@ fn rest(window: &mut Window) -> f64 {
     (window.commands, window.outputs) = (Vec::new(), Vec::new());
     let app = window.harness.state_mut();
     app.session.loader.cancel_all();
-    app.session.history = crate::session::document::History::default();
+    app.session.history = crate::session::History::default();
     app.session.version += 1;
     // A film preview may hold tens of thousands of cameras.
     app.ui.panels.film.stop();

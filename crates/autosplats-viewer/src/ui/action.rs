@@ -3,13 +3,9 @@
 use autosplats::Camera;
 use autosplats::cloud::glam::{DMat4, DVec3};
 
-use crate::session::document::{ClipBox, Document, LayerId};
-use crate::session::kept::StoredInput;
-use crate::session::loading::Input;
-use crate::session::playing::Clock;
-use crate::ui::commands::Command;
-use crate::view::look::Look;
-use crate::view::recording::Recording;
+use crate::session::{ClipBox, Clock, Document, Input, LayerId, StoredInput};
+use crate::ui::Command;
+use crate::view::{Look, Recording};
 
 /// Something to do.
 pub(crate) enum Action {

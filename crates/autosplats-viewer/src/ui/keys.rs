@@ -2,10 +2,8 @@
 
 use eframe::egui::{self, Event, Key, Modifiers};
 
-use crate::session::loading::Input;
-use crate::ui::Ui;
-use crate::ui::action::Action;
-use crate::ui::commands::Command;
+use crate::session::Input;
+use crate::ui::{Action, Command, Ui};
 
 /// Keys taken from egui.
 #[derive(Default)]

@@ -1,19 +1,22 @@
 //! What the user sees and touches around the picture: panels, tools and messages.
 
-pub(crate) mod action;
-pub(crate) mod commands;
-pub(crate) mod gizmo;
-pub(crate) mod keys;
+mod action;
+mod commands;
+mod gizmo;
+mod keys;
 pub(crate) mod panels;
-pub(crate) mod pointer;
-pub(crate) mod tools;
+mod pointer;
+mod tools;
 
 use eframe::egui;
 
-use self::keys::Keys;
-use self::panels::Panels;
-use self::pointer::Pointer;
-use self::tools::Tools;
+pub(crate) use self::action::Action;
+pub(crate) use self::commands::{Command, Tool};
+pub(crate) use self::gizmo::Gizmo;
+pub(crate) use self::keys::Keys;
+pub(crate) use self::panels::{Panels, Pose};
+pub(crate) use self::pointer::Pointer;
+pub(crate) use self::tools::Tools;
 use crate::messages::Messages;
 
 /// Panels, tools and messages.

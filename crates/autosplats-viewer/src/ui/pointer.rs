@@ -4,11 +4,8 @@ use autosplats::cloud::glam::{DVec2, DVec3};
 use eframe::egui::{self, MouseWheelSource, PointerButton};
 
 use crate::session::Session;
-use crate::ui::commands::Tool;
-use crate::ui::tools::Tools;
-use crate::view::View;
-use crate::view::look::TwoFingers;
-use crate::view::render::Purpose;
+use crate::ui::{Tool, Tools};
+use crate::view::{Purpose, TwoFingers, View};
 
 /// Zoom per point scrolled: natural logarithm of the factor.
 const ZOOM_PER_SCROLL: f64 = 0.0024;

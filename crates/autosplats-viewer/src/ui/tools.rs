@@ -3,13 +3,10 @@
 use autosplats::cloud::glam::DVec3;
 use eframe::egui::{self, Color32, Pos2, Stroke};
 
-use crate::session::Session;
-use crate::session::document::{PickedPoint, Region, SelectMode};
 use crate::session::measure::angle_text;
-use crate::ui::commands::Tool;
-use crate::ui::gizmo::Gizmo;
-use crate::view::View;
-use crate::view::render::{PickHit, Purpose, Task};
+use crate::session::{PickedPoint, Region, SelectMode, Session};
+use crate::ui::{Gizmo, Tool};
+use crate::view::{PickHit, Purpose, Task, View};
 
 /// Initial radius of the brush, screen points.
 const INITIAL_BRUSH_RADIUS: f32 = 24.0;

@@ -6,9 +6,7 @@ use autosplats::{Camera, Projection, ViewDirection};
 use autosplats_sources::Source;
 
 use super::View;
-use crate::session::Session;
-use crate::session::glance::{FOV_DEG, ViewFrame};
-use crate::session::opening::Arrival;
+use crate::session::{Arrival, FOV_DEG, Session, ViewFrame};
 
 impl View {
     /// Receives that points have arrived. The camera moves to show them if they are the first ones, or if the user has

@@ -3,15 +3,15 @@
 pub(crate) mod animation;
 mod camera;
 pub(crate) mod legend;
-pub(crate) mod look;
-pub(crate) mod navigation;
+mod look;
+mod navigation;
 mod output;
 pub(crate) mod overlay;
 mod pictures;
-pub(crate) mod rate;
-pub(crate) mod recording;
-pub(crate) mod render;
-pub(crate) mod screen;
+mod rate;
+mod recording;
+mod render;
+mod screen;
 pub(crate) mod state;
 pub(crate) mod storage;
 pub(crate) mod turns;
@@ -21,14 +21,15 @@ use std::sync::Arc;
 use autosplats::{AdapterSummary, Camera};
 use eframe::egui::{self, Color32, Sense};
 
-use self::look::Look;
-use self::navigation::Navigation;
+pub(crate) use self::look::{Look, TwoFingers};
+pub(crate) use self::navigation::{Flight, Navigation};
 use self::pictures::RequestKey;
-use self::rate::Rate;
-use self::recording::Recording;
-use self::render::{Picture, RenderThread};
-use self::screen::OnScreen;
-use self::turns::Turns;
+pub(crate) use self::rate::Rate;
+pub(crate) use self::recording::Recording;
+pub(crate) use self::render::{Answer, Goal, Outcome, PickHit, Picture, Purpose, RenderRequest, RenderThread, Task};
+pub(crate) use self::screen::OnScreen;
+pub(crate) use self::state::State;
+pub(crate) use self::turns::Turns;
 use crate::messages::MessageSender;
 
 /// The camera and its pictures.
@@ -46,9 +47,9 @@ pub(crate) struct View {
     pub(crate) rect: egui::Rect,
     /// The camera that the program chose by itself, and the picture's width over height at the time. Until the user
     /// moves, a new camera is chosen when points arrive or the picture changes its shape.
-    pub(crate) first_camera: Option<(Camera, f64)>,
+    first_camera: Option<(Camera, f64)>,
     /// Whether a camera was given, so that the first input is not fitted into the picture.
-    pub(crate) camera_given: bool,
+    camera_given: bool,
     /// What the last requested picture shows.
     wished: Option<RequestKey>,
     /// Whether the last requested picture is still to come.

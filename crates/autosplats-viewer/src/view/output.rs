@@ -7,7 +7,7 @@ use autosplats::Image;
 use super::View;
 use crate::files;
 use crate::threads::spawn;
-use crate::view::render::{Goal, Task};
+use crate::view::{Goal, Task};
 
 impl View {
     /// Hands a picture to its goal. `range` is the value range of its colours.

@@ -7,11 +7,8 @@ use autosplats::cloud::Axes;
 use eframe::egui;
 
 use super::View;
-use crate::session::Session;
-use crate::session::document::ShownCloud;
-use crate::view::look::Look;
-use crate::view::navigation::Flight;
-use crate::view::render::{Answer, Outcome, Purpose, RenderRequest, Task};
+use crate::session::{Session, ShownCloud};
+use crate::view::{Answer, Flight, Look, Outcome, Purpose, RenderRequest, Task};
 
 /// Seconds from the last movement until the whole picture is rendered.
 const REST_DELAY_S: f64 = 0.12;

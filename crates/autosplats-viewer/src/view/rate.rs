@@ -1,6 +1,6 @@
 //! The frame rate.
 
-use crate::view::render::Picture;
+use crate::view::Picture;
 
 /// Measures pictures per second while the picture changes.
 #[derive(Default)]

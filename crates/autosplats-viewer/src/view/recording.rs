@@ -13,9 +13,9 @@ use autosplats_film::{Film, Frames, Target};
 use eframe::egui;
 
 use crate::files;
-use crate::session::playing::Reel;
+use crate::session::Reel;
 use crate::threads::spawn;
-use crate::view::render::RenderRequest;
+use crate::view::RenderRequest;
 
 /// Pictures that may wait for the writer.
 const MAX_WAITING_PICTURES: usize = 3;
@@ -185,8 +185,8 @@ mod tests {
     use autosplats::{Backend, Settings};
 
     use super::*;
-    use crate::session::document::Document;
-    use crate::view::navigation::Navigation;
+    use crate::session::Document;
+    use crate::view::Navigation;
 
     fn recording(pictures: usize, target: &Target) -> Recording {
         let camera = Navigation::new().camera();

@@ -8,13 +8,8 @@ use autosplats_sources::Source;
 use serde::{Deserialize, Serialize};
 
 use crate::files;
-use crate::session::Session;
-use crate::session::document::ClipBox;
-use crate::session::kept::StoredInput;
-use crate::session::loading::Appearance;
-use crate::session::playing::Clock;
-use crate::view::View;
-use crate::view::look::Look;
+use crate::session::{Appearance, ClipBox, Clock, Session, StoredInput};
+use crate::view::{Look, View};
 
 /// A session. Points and edits are not part of it; they are saved by exporting.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

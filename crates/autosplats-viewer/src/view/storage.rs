@@ -2,10 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::session::Session;
-use crate::session::kept::StoredInput;
-use crate::view::View;
-use crate::view::look::Look;
+use crate::session::{Session, StoredInput};
+use crate::view::{Look, View};
 
 const LOOK: &str = "look";
 const RECENT: &str = "recent";

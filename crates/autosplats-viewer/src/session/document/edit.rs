@@ -7,7 +7,7 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::{Bits, Document, Layer, LayerId, layers::can_place, shown::bounds};
+use super::{Bits, Document, Layer, LayerId, bounds::bounds, layers::can_place};
 
 /// Points held by a drag, with the moves applied to them before the drag.
 #[derive(Clone, Debug)]

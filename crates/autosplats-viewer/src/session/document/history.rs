@@ -74,9 +74,11 @@ impl History {
 
     /// Applies `change` to the document and all its past and undone versions. It is for changes that undo must not
     /// revert, as the reading of a file.
-    pub(crate) fn everywhere(&mut self, change: impl Fn(&mut Document)) {
+    pub(crate) fn everywhere<T>(&mut self, change: impl Fn(&mut Document) -> T) {
         let steps = self.past.iter_mut().chain(&mut self.future).map(|step| &mut step.document);
-        steps.chain([&mut self.current]).for_each(change);
+        steps.chain([&mut self.current]).for_each(|document| {
+            change(document);
+        });
     }
 
     /// Replaces the points of a layer in all versions. Edits of single points are dropped everywhere, as the new points

@@ -13,7 +13,7 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::{Bits, shown::bounds};
+use super::{Bits, bounds::bounds};
 
 /// Identifies a layer in this process. Clones of a layer, as undo keeps them, have the same id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

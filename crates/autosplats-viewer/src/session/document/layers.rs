@@ -7,7 +7,7 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::{Counts, Document, Layer, LayerId, layer::Edits};
+use super::{Counts, Document, Layer, LayerId, bounds_of, layer::Edits};
 
 /// Largest number of points of an overview: enough to find the size of a scene.
 const OVERVIEW_POINT_COUNT: usize = 100_000;
@@ -154,11 +154,6 @@ impl Document {
             deleted: all.deleted + own.deleted,
         })
     }
-}
-
-/// Bounds of an [overview](Document::overview).
-pub(crate) fn bounds_of(overview: &PointCloud) -> Option<[DVec3; 2]> {
-    super::shown::bounds(overview.len(), |index| Some(overview.world_position(index)))
 }
 
 /// Whether a matrix is an affine map with an inverse.

@@ -17,6 +17,7 @@
 //! are in these metres; exported coordinates are in degrees again.
 
 mod bits;
+mod bounds;
 mod clip;
 mod edit;
 mod export;
@@ -32,12 +33,13 @@ mod tests;
 
 pub(crate) use self::{
     bits::Bits,
+    bounds::bounds_of,
     clip::ClipBox,
     edit::{Grip, about},
     export::{ExportError, ExportScope, Exported, Replace, export},
     history::{History, grouped, label},
     layer::{Counts, Layer, LayerId},
-    layers::{bounds_of, can_place},
+    layers::can_place,
     pick::{PickedPoint, shortest},
     region::Region,
     select::SelectMode,

@@ -7,10 +7,7 @@ use autosplats_sources::Source;
 
 use super::thread::StreamThread;
 use super::{PlayingInput, RemovedInput};
-use crate::session::Session;
-use crate::session::document::LayerId;
-use crate::session::glance::FirstLook;
-use crate::session::loading::{Appearance, Input};
+use crate::session::{Appearance, FirstLook, Input, LayerId, Session};
 
 impl Session {
     /// Starts to play an input.

@@ -15,8 +15,7 @@ use autosplats_sources::{Statistics, Timeline, beginnings};
 pub(crate) use self::clock::{Clock, SPEEDS};
 pub(crate) use self::reel::{Reel, Track};
 use self::thread::StreamThread;
-use crate::session::document::LayerId;
-use crate::session::loading::{Appearance, Input};
+use crate::session::{Appearance, Input, LayerId};
 
 /// Longest time limit of a picture while an input plays, milliseconds. Also the limit for a live input whose update
 /// rate is unknown.

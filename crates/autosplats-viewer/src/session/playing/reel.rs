@@ -13,8 +13,7 @@ use autosplats_sources::Player;
 use eframe::egui;
 
 use crate::messages::MessageSender;
-use crate::session::document::LayerId;
-use crate::session::loading::Input;
+use crate::session::{Input, LayerId};
 
 /// Pictures whose points are read ahead, besides the one in work.
 const AHEAD: usize = 1;

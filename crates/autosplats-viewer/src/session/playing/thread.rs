@@ -8,8 +8,7 @@ use autosplats_formats::ReadOptions;
 use autosplats_sources::{Statistics, Timeline};
 use eframe::egui;
 
-use crate::session::glance::{FirstLook, SharedViewFrame};
-use crate::session::loading::Input;
+use crate::session::{FirstLook, Input, SharedViewFrame};
 
 /// Longest silence of a live stream before the thread checks whether the stream is still wanted.
 const SILENCE_LIMIT: Duration = Duration::from_millis(100);

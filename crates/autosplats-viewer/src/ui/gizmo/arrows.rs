@@ -6,9 +6,9 @@ use eframe::egui::{Color32, Painter, Pos2, Stroke};
 
 use super::lens::{Shape, WindowLens, along, angle, on_plane};
 use super::{Handle, line};
-use crate::session::Session;
-use crate::session::document::{Grip, about};
+use crate::session::document::about;
 use crate::session::measure::angle_text;
+use crate::session::{Grip, Session};
 
 /// Start and end of an arrow, screen points from the middle.
 const ARROW_ENDS_POINTS: [f64; 2] = [16.0, 78.0];
@@ -216,7 +216,7 @@ pub(super) fn show(middle: DVec3, lens: &WindowLens, painter: &Painter, taken: O
 mod tests {
     use super::super::lens::tests::{FAR, views};
     use super::*;
-    use crate::session::document::Document;
+    use crate::session::Document;
 
     fn drag(lens: &WindowLens, handle: Handle, place: Pos2) -> Drag {
         Drag::of(Document::default().grip(), FAR, lens, handle, place).expect("it is seen well")

@@ -5,8 +5,7 @@ use eframe::egui::{Color32, Painter, Pos2, Stroke};
 
 use super::lens::{Shape, WindowLens, along};
 use super::{Handle, line};
-use crate::session::Session;
-use crate::session::document::ClipBox;
+use crate::session::{ClipBox, Session};
 use crate::view::View;
 
 /// Segments of an edge, each drawn faint where it is hidden.

@@ -15,8 +15,7 @@ use autosplats::cloud::glam::DVec3;
 use eframe::egui::{self, Color32, CursorIcon, Pos2, Stroke};
 
 use self::lens::{Shape, WindowLens, nearest};
-use crate::session::Session;
-use crate::session::document::ClipBox;
+use crate::session::{ClipBox, Session};
 use crate::view::View;
 
 /// A handle that can be dragged.

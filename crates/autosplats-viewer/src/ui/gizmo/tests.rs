@@ -10,9 +10,9 @@ use super::lens::WindowLens;
 use super::*;
 use crate::Options;
 use crate::app::App;
-use crate::session::document::{Layer, SelectMode};
-use crate::ui::commands::Command;
-use crate::view::look::Look;
+use crate::session::{Layer, SelectMode};
+use crate::ui::Command;
+use crate::view::Look;
 
 /// An application with 1,000 points in the unit cube, all selected, with a clipping box; and its lens.
 fn app() -> (App, WindowLens) {

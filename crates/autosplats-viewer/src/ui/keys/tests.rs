@@ -6,9 +6,9 @@ use autosplats::cloud::glam::DVec3;
 use super::*;
 use crate::Options;
 use crate::app::App;
-use crate::session::document::{Layer, SelectMode};
-use crate::ui::commands::Tool;
-use crate::view::look::Look;
+use crate::session::{Layer, SelectMode};
+use crate::ui::Tool;
+use crate::view::Look;
 
 /// An application whose points are all selected.
 fn app(context: &egui::Context) -> App {

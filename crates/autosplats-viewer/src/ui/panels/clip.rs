@@ -3,10 +3,8 @@
 use autosplats::cloud::glam::{DQuat, DVec3};
 use eframe::egui;
 
-use crate::session::Session;
-use crate::session::document::ClipBox;
-use crate::ui::action::Action;
-use crate::ui::gizmo::Gizmo;
+use crate::session::{ClipBox, Session};
+use crate::ui::{Action, Gizmo};
 use crate::view::View;
 
 /// Change of a number per screen point dragged, as a share of the box's longest side.

@@ -11,10 +11,10 @@ use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile, Write};
 use crate::messages::MessageSender;
-use crate::session::Session;
-use crate::session::document::{Document, ExportError, ExportScope, Exported, LayerId, Replace, export, grouped};
+use crate::session::document::{export, grouped};
+use crate::session::{Document, ExportError, ExportScope, Exported, LayerId, Replace, Session};
 use crate::threads::spawn;
-use crate::ui::action::Action;
+use crate::ui::Action;
 use crate::view::View;
 
 /// State of the dialog and of the export.
@@ -189,9 +189,8 @@ fn choices(session: &Session) -> Vec<(String, ExportScope, bool)> {
         ("All points, including hidden ones".into(), ExportScope::All, counts.points > 0),
     ];
     if document.layers.len() > 1 {
-        let layer = |layer: &crate::session::document::Layer| {
-            (format!("All of {}", layer.name), ExportScope::Layer(layer.id), true)
-        };
+        let layer =
+            |layer: &crate::session::Layer| (format!("All of {}", layer.name), ExportScope::Layer(layer.id), true);
         choices.extend(document.layers.iter().map(layer));
     }
     choices
@@ -199,7 +198,7 @@ fn choices(session: &Session) -> Vec<(String, ExportScope, bool)> {
 
 /// The layers that are saved by an export, as all their remaining points are in the file.
 fn saved_layers(document: &Document, what: ExportScope) -> Vec<LayerId> {
-    let complete = |layer: &&crate::session::document::Layer| match what {
+    let complete = |layer: &&crate::session::Layer| match what {
         ExportScope::All => true,
         ExportScope::Layer(id) => layer.id == id,
         ExportScope::Shown => {

@@ -7,13 +7,11 @@ use autosplats_film::{Error, Target, has_ffmpeg};
 use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile};
-use crate::session::Session;
-use crate::session::playing::{Clock, Playing, Reel};
+use crate::session::{Clock, Playing, Reel, Session};
 use crate::threads::spawn;
-use crate::ui::action::Action;
-use crate::view::View;
+use crate::ui::Action;
 use crate::view::animation::{path, turntable};
-use crate::view::recording::Recording;
+use crate::view::{Recording, View};
 
 /// Largest number of pictures of a film.
 const MAX_PICTURES: f64 = 1e6;

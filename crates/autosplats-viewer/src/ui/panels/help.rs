@@ -2,7 +2,7 @@
 
 use eframe::egui;
 
-use crate::ui::commands::Command;
+use crate::ui::Command;
 
 const MOUSE: [(&str, &str); 13] = [
     ("Left drag", "Turn about the pivot"),

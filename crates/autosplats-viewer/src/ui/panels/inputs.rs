@@ -4,12 +4,9 @@ use autosplats::cloud::glam::DVec3;
 use eframe::egui;
 
 use super::layer::{Naming, naming};
-use crate::session::Session;
-use crate::session::document::{Layer, LayerId, PickedPoint, grouped, shortest};
-use crate::session::loading::Loader;
-use crate::session::playing::{Playing, WaitingInput};
-use crate::ui::action::Action;
-use crate::ui::commands::Command;
+use crate::session::document::{grouped, shortest};
+use crate::session::{Layer, LayerId, Loader, PickedPoint, Playing, Session, WaitingInput};
+use crate::ui::{Action, Command};
 use crate::view::View;
 
 /// The list of inputs.

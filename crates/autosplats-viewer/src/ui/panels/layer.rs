@@ -3,9 +3,8 @@
 use autosplats_sources::Source;
 use eframe::egui;
 
-use crate::session::Session;
-use crate::session::document::{Layer, LayerId};
-use crate::ui::action::Action;
+use crate::session::{Layer, LayerId, Session};
+use crate::ui::Action;
 
 /// A name that is being typed.
 pub(crate) struct Naming {

@@ -3,10 +3,8 @@
 use autosplats::{Backend, Background, Backs, ColorMap, ColorMode, SearchEngine, Settings, usual_exposure};
 use eframe::egui::{self, ComboBox, DragValue, Slider};
 
-use crate::ui::action::Action;
-use crate::view::View;
-use crate::view::look::{Look, TwoFingers};
-use crate::view::render::Picture;
+use crate::ui::Action;
+use crate::view::{Look, Picture, TwoFingers, View};
 
 /// Colour modes that every cloud has, or whose absence is reported.
 const MODES: [(&str, ColorMode); 9] = [

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use autosplats::cloud::glam::DVec3;
 use eframe::egui;
 
-use crate::session::Session;
-use crate::session::measure::{Ruler, angle_text};
+use crate::session::measure::angle_text;
+use crate::session::{Ruler, Session};
 use crate::view::View;
 
 /// Shows the values of a measurement by its corners, for the tool that measures.

@@ -5,11 +5,8 @@ use eframe::egui;
 
 use super::command_button;
 use crate::session::Session;
-use crate::ui::action::Action;
-use crate::ui::commands::{Command, Tool};
-use crate::ui::tools::Tools;
-use crate::view::View;
-use crate::view::look::Look;
+use crate::ui::{Action, Command, Tool, Tools};
+use crate::view::{Look, View};
 
 /// Shows the menus. Returns their place.
 pub(super) fn show(

@@ -25,11 +25,8 @@ pub(crate) mod welcome;
 use eframe::egui;
 
 pub(crate) use self::pose::Pose;
-use crate::session::Session;
-use crate::session::document::LayerId;
-use crate::ui::action::Action;
-use crate::ui::commands::{Command, Tool};
-use crate::ui::tools::Tools;
+use crate::session::{LayerId, Session};
+use crate::ui::{Action, Command, Tool, Tools};
 use crate::view::View;
 
 /// The panels, windows and dialogs.

@@ -4,7 +4,7 @@ use autosplats::cloud::glam::DVec3;
 use eframe::egui;
 
 use crate::session::Session;
-use crate::ui::action::Action;
+use crate::ui::Action;
 use crate::view::View;
 
 /// The numbers that are being entered.

@@ -7,8 +7,8 @@ use eframe::egui;
 
 use crate::files::ask_for_inputs;
 use crate::messages::MessageSender;
-use crate::session::loading::Input;
-use crate::ui::action::Action;
+use crate::session::Input;
+use crate::ui::Action;
 
 #[derive(Default)]
 pub(crate) struct Dialogs {

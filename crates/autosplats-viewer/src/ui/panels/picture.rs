@@ -11,8 +11,7 @@ use eframe::egui;
 use super::export::has_extension;
 use super::target_file::{DialogTexts, TargetFile, Write};
 use crate::session::Session;
-use crate::view::View;
-use crate::view::render::{Goal, Task};
+use crate::view::{Goal, Task, View};
 
 pub(crate) struct PictureDialog {
     pub(crate) open: bool,

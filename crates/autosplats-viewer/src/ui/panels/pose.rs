@@ -3,9 +3,9 @@
 use autosplats::cloud::glam::{DMat3, DMat4, DQuat, DVec3, EulerRot};
 use eframe::egui;
 
-use crate::session::Session;
-use crate::session::document::{Layer, LayerId, can_place};
-use crate::ui::action::Action;
+use crate::session::document::can_place;
+use crate::session::{Layer, LayerId, Session};
+use crate::ui::Action;
 use crate::view::View;
 
 /// The pose that is being edited.

@@ -6,8 +6,7 @@ use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile};
 use crate::session::Session;
-use crate::view::View;
-use crate::view::state::State;
+use crate::view::{State, View};
 
 /// State of the dialog.
 pub(crate) struct SessionDialog {

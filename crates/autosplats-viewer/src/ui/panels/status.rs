@@ -2,9 +2,8 @@
 
 use eframe::egui;
 
-use crate::session::Session;
 use crate::session::document::grouped;
-use crate::session::editing::CachedCounts;
+use crate::session::{CachedCounts, Session};
 use crate::view::View;
 
 /// The line, and the memory of the program, which is queried once a second.

@@ -2,9 +2,8 @@
 
 use eframe::egui;
 
-use crate::session::playing::{Clock, Playing, SPEEDS};
-use crate::ui::action::Action;
-use crate::ui::commands::Command;
+use crate::session::{Clock, Playing, SPEEDS};
+use crate::ui::{Action, Command};
 
 /// Shows the timeline, if something plays. Returns its place.
 pub(super) fn show(ui: &mut egui::Ui, playing: &Playing, actions: &mut Vec<Action>) -> Option<egui::Rect> {

@@ -3,8 +3,7 @@
 use eframe::egui::{self, Color32};
 
 use crate::session::Session;
-use crate::ui::action::Action;
-use crate::ui::commands::Command;
+use crate::ui::{Action, Command};
 
 /// Shows the welcome of an empty window, or what the first input waits for.
 pub(crate) fn show(session: &Session, ui: &mut egui::Ui, rect: egui::Rect, actions: &mut Vec<Action>) {

@@ -7,9 +7,8 @@ use eframe::egui::{Event, Key, Modifiers, PointerButton, Rect, pos2, vec2};
 use super::*;
 use crate::Options;
 use crate::app::App;
-use crate::session::document::Layer;
-use crate::view::look::Look;
-use crate::view::render::{Answer, Goal, Outcome};
+use crate::session::Layer;
+use crate::view::{Answer, Goal, Look, Outcome};
 
 /// An application in a window of 200 by 200 points. Its cloud has two points, one of them in the middle of the window.
 fn app(context: &egui::Context, tool: Tool) -> App {

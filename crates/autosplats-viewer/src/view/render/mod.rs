@@ -25,7 +25,7 @@ use eframe::egui;
 
 pub(crate) use self::depths::Depths;
 pub(crate) use self::task::{Goal, Outcome, PickHit, Purpose, Task};
-use crate::session::document::{Document, ShownCloud};
+use crate::session::{Document, ShownCloud};
 
 /// A request for a picture.
 #[derive(Clone)]

@@ -7,7 +7,7 @@ use autosplats::Image;
 use autosplats::cloud::glam::DVec3;
 
 use super::RenderRequest;
-use crate::session::document::{Region, SelectMode, ShownCloud};
+use crate::session::{Region, SelectMode, ShownCloud};
 
 impl RenderRequest {
     /// The same request, for finding points: splats instead of dots. Where dots are shown, all points are visible; so

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::pace::{Costs, Reduction};
 use super::task::{Goal, Outcome, PickHit, enlarge};
 use super::{Answer, Depths, Outbox, Picture, RenderRequest, Shared, Task};
-use crate::session::document::{Document, LayerId, ShownCloud};
+use crate::session::{Document, LayerId, ShownCloud};
 
 /// Colour that selected points are mixed with, sRGB.
 const SELECTION_COLOR: [u16; 3] = [255, 140, 20];
@@ -437,7 +437,7 @@ mod tests {
     use std::sync::{Condvar, Mutex};
 
     use super::*;
-    use crate::session::document::Layer;
+    use crate::session::Layer;
 
     #[test]
     fn brightness_stays_while_layers_are_edited_and_play() {

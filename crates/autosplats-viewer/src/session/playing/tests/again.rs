@@ -5,9 +5,7 @@ use super::*;
 /// Removes the only layer, as its menu does.
 fn remove(app: &mut App) {
     let id = app.session.document().layers[0].id;
-    app.session.edit("Remove an input", |document| {
-        document.remove(id);
-    });
+    app.session.edit("Remove an input", |document| document.remove(id));
     app.session.follow_streams(0.0);
     assert!(app.session.playing.is_empty(), "it is not read any more");
 }
@@ -38,7 +36,7 @@ fn undo_brings_a_layer_back_with_its_stream() {
     app.session.playing.step(true);
     until(&mut app, "the fifth frame", |app| left(app) == Some(40.0));
     remove(&mut app);
-    app.session.history = crate::session::document::History::default();
+    app.session.history = crate::session::History::default();
     app.session.follow_streams(0.0);
     assert!(app.session.playing.removed.is_empty(), "what undo cannot bring back is forgotten");
 }

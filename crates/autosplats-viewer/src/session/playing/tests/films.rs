@@ -5,9 +5,8 @@ use autosplats_film::Target;
 use autosplats_formats::ReadOptions;
 
 use super::*;
-use crate::session::playing::Reel;
-use crate::view::recording::Recording;
-use crate::view::render::{Answer, Outcome};
+use crate::session::Reel;
+use crate::view::{Answer, Outcome, Recording};
 
 /// Writes a film of some clock positions. Returns its pictures in order, or why there are none.
 fn film(app: &mut App, context: &egui::Context, places: &[f64], folder: &Path) -> Result<Vec<Image>, String> {
@@ -21,8 +20,8 @@ fn film(app: &mut App, context: &egui::Context, places: &[f64], folder: &Path) -
     loop {
         assert!(begun.elapsed() < Duration::from_secs(60), "the film does not end");
         if let Some(wish) = recording.wanted()? {
-            let goal = crate::view::render::Goal::Film(recording.number);
-            app.view.render.task(crate::view::render::Task::Photograph { wish: Box::new(wish), goal });
+            let goal = crate::view::Goal::Film(recording.number);
+            app.view.render.task(crate::view::Task::Photograph { wish: Box::new(wish), goal });
         }
         for answer in app.view.render.answers().collect::<Vec<_>>() {
             match answer {

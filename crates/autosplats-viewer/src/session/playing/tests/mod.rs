@@ -10,7 +10,7 @@ use eframe::egui;
 
 use super::{LIVE_MS, LIVE_SHARE, UpdateRate};
 use crate::app::App;
-use crate::view::look::Look;
+use crate::view::Look;
 use crate::{Input, Options};
 
 /// Frames of 40 points each. Each frame is shifted to the right of the one before.
@@ -111,7 +111,7 @@ fn edits_are_not_played_over() {
 fn delete(app: &mut App) {
     app.session.edit_points("Delete", |document| {
         let shown = document.shown();
-        document.select(&shown, |index| index < 7, crate::session::document::SelectMode::Replace);
+        document.select(&shown, |index| index < 7, crate::session::SelectMode::Replace);
         document.delete_selected()
     });
 }
@@ -155,7 +155,7 @@ fn what_waits_for_its_first_points_says_so() {
     app.session.open(input);
     assert!(why(&app).is_some(), "another one does");
     let context = egui::Context::default();
-    app.run(crate::ui::commands::Command::CloseAll, &context);
+    app.run(crate::ui::Command::CloseAll, &context);
     app.session.follow_streams(0.0);
     assert!(app.session.playing.is_empty() && app.session.failed.is_empty(), "closed as all is");
 }

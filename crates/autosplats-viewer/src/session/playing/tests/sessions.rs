@@ -1,8 +1,8 @@
 //! A restored session plays as before.
 
 use super::*;
-use crate::session::loading::Appearance;
-use crate::view::state::State;
+use crate::session::Appearance;
+use crate::view::State;
 
 /// The application that restores the session at `path`.
 fn again(path: &Path, context: &egui::Context) -> App {
@@ -37,9 +37,7 @@ fn a_session_plays_the_same() {
     // All four frames so far, accumulated.
     until(&mut first, "the fourth frame", |app| app.session.document().counts().points == 160);
     let id = first.session.document().layers[0].id;
-    first.session.settle(|document| {
-        document.set_tint(id, Some([1, 2, 3]));
-    });
+    first.session.settle(|document| document.set_tint(id, Some([1, 2, 3])));
     let kept = State::of(&first.session, &first.view);
     let path = folder.path().join("state.json");
     kept.write(&path).expect("written");
