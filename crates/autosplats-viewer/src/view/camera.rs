@@ -1,7 +1,7 @@
 //! The camera's place: chosen for the first points, fitted to points, or given.
 
-use autosplats::cloud::glam::DVec3;
 use autosplats::cloud::PointCloud;
+use autosplats::cloud::glam::DVec3;
 use autosplats::{Camera, Projection, ViewDirection};
 use autosplats_sources::Source;
 
