@@ -4,16 +4,20 @@
 // Reads: density, levels, clusters, measured, sheets, depth_noise. Reads and writes: counters, surfels.
 
 #import frame
-#import groups
-#import counters
+#import alone
 #import base_radius
 #import calls
 #import choose
 #import depth_noise
+#import groups
+#import levels
 #import moved
+#import noise
+#import orthonormal
+#import round
 #import sheet
-#import alone
 #import shrink
+#import surfel
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -23,16 +27,6 @@
 @group(0) @binding(6) var<storage, read> sheets: array<Sheet>;
 @group(0) @binding(7) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(8) var<storage, read_write> surfels: array<Surfel>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
-override MAX_NOISE_K_RADII: f32;
-override MAX_K_RADIUS_FIRST_RADII: f32;
-override OUTLIER_OFFSET_NOISES: f32;
-override OUTLIER_OFFSET_KNOWN_NOISES: f32;
-override GRAZING_COSINE: f32;
-override FARTHEST_ALONG: f32;
-override LONGEST_SHADOW: f32;
 
 // The surface beside a surfel.
 struct Surface {

@@ -4,14 +4,15 @@
 // of their k-radii and the smallest point index.
 
 #import frame
-#import groups
-#import counters
-#import levels
-#import divide
 #import calls
 #import depth_noise
-#import sheet
+#import divide
+#import groups
+#import levels
+#import noise
+#import round
 #import screen
+#import surfel
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> levels: array<Level>;
@@ -19,11 +20,6 @@
 @group(0) @binding(4) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(5) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(6) var<storage, read_write> asked: array<atomic<u32>>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
-override K_RADIUS_PARTS_PER_PX: f32;
-override MAX_SUMMED_K_RADIUS_PX: f32;
 
 @compute @workgroup_size(64)
 fn ask(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {

@@ -4,13 +4,16 @@
 // Reads: levels, clusters, measured, asked, depth_noise. Reads and writes: sheets.
 
 #import frame
-#import groups
 #import calls
 #import choose
+#import clusters
 #import depth_noise
-#import together
-#import sheet
 #import divide
+#import groups
+#import levels
+#import noise
+#import sheet
+#import together
 
 @group(0) @binding(1) var<storage, read> levels: array<Level>;
 @group(0) @binding(2) var<storage, read> clusters: array<vec4f>;
@@ -19,9 +22,6 @@
 @group(0) @binding(5) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(6) var<storage, read_write> sheets: array<Sheet>;
 
-override K_RADIUS_PARTS_PER_PX: f32;
-override COVERED: f32;
-override COVERED_REACH: f32;
 // Cells of a workgroup.
 override ITEMS_PER_GROUP: u32;
 
@@ -123,7 +123,7 @@ fn fit_cell(level: Level, cell: u32) {
         for (var index = 0u; index < SLABS; index++) {
             if left[index] > 0.0 {
                 let over = under(sheet, clusters[cluster_at(first, index)].xyz);
-                let is_covered = abs(over.height) < COVERED * noise && over.near > 1.0 - COVERED_REACH;
+                let is_covered = abs(over.height) < COVERED_NOISES * noise && over.near > 1.0 - COVERED_REACH;
                 left[index] = select(left[index], 0.0, is_covered);
             }
         }

@@ -10,12 +10,9 @@
 @group(0) @binding(1) var<storage, read_write> asked: array<u32>;
 @group(0) @binding(2) var<storage, read_write> sheets: array<Sheet>;
 
-// The finest level whose cells may have sheets; it has the most cells.
-override FINE_SHEETS: u32;
-
 @compute @workgroup_size(64)
 fn forget(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let level = levels[FINE_SHEETS];
+    let level = levels[SHEET_LEVELS[0]];
     let cell = group_index(workgroup) * 64u + local;
     if cell < level.columns * level.rows {
         asked[3u * cell] = 0u;

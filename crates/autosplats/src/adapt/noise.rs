@@ -26,7 +26,7 @@ pub(super) const STRUCTURE_GROWTH_POWER: f32 = 0.8;
 /// Range of powers above [`STRUCTURE_GROWTH_POWER`] over which growth goes from structure to noise alone.
 pub(super) const GROWTH_POWER_RAMP: f32 = 0.4;
 /// Noise grows up to twice the k-radius that one in this many sampled points exceeds; outliers may be further apart.
-pub(super) const BEYOND: usize = 8;
+pub(super) const GROWTH_END_DIVISOR: usize = 8;
 /// Surfels per task when scatter is measured.
 const TASK: usize = 32;
 /// Surfels per task when the sample is picked.
@@ -136,7 +136,7 @@ impl Noise {
                     // uncertain.
                     let both = least.sqrt() * most.sqrt();
                     let middle = if all > 0.0 { all.powf(1.0 - grows) * both.powf(grows) } else { both };
-                    let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;
+                    let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / GROWTH_END_DIVISOR].surfel.k_radius;
                     let level = by_steady * middle * (beyond / (small.sqrt() * large.sqrt())).powf(power);
                     return Self { level, power, most: beyond, sure };
                 }

@@ -4,28 +4,13 @@
 // the cells with sheets, largest k-radius of growth, and certainty.
 
 #import frame
-#import surfel
 #import quantiles
+#import surfel
 
 @group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(2) var<storage, read> sampled: array<u32>;
 @group(0) @binding(3) var<storage, read> quantiles: array<vec2u>;
 @group(0) @binding(4) var<storage, read_write> measured: array<f32>;
-
-override SCALES: u32;
-override MOST_SAMPLED: u32;
-override LEAST_SAMPLE: u32;
-override MIN_K_RADIUS_CONTRAST: f32;
-override FULL_K_RADIUS_CONTRAST: f32;
-override STRUCTURE_GROWTH_POWER: f32;
-override GROWTH_POWER_RAMP: f32;
-override BEYOND: u32;
-override THICK_NOISE: f32;
-override FINE_SHEETS: u32;
-override COARSE_SHEETS: u32;
-override SURE_FROM: f32;
-override SURE_TO: f32;
-override STEADY_SCALES: u32;
 
 // Noise level of a part of the sample with about the same density; 0 if the part is too small.
 fn scatter_level(part: u32) -> f32 {
@@ -55,7 +40,7 @@ fn noise_certainty() -> f32 {
     for (var scale = 0u; scale < SCALES; scale++) {
         if quantiles[ALL * SCALES + scale].x == OF_THIN_BALLS {
             let share = bitcast<f32>(quantiles[SAMPLE_PARTS * SCALES + min(scale, STEADY_SCALES - 1u)].y);
-            return saturate((share - SURE_FROM) * (1.0 / (SURE_TO - SURE_FROM)));
+            return saturate((share - CERTAIN_NOISE_SHARES[0]) * (1.0 / (CERTAIN_NOISE_SHARES[1] - CERTAIN_NOISE_SHARES[0])));
         }
     }
     return 0.0;
@@ -92,7 +77,7 @@ fn noise_of_sample() -> vec3f {
                 // Through the geometric mean of both thirds, blended with the level of all where growth is uncertain.
                 let both = sqrt(least) * sqrt(most);
                 let middle = select(both, pow(all, 1.0 - grows) * pow(both, grows), all > 0.0);
-                let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);
+                let beyond = 2.0 * k_radius(len - 1u - len / GROWTH_END_DIVISOR);
                 let level = by_steady * middle * pow(beyond / (sqrt(small) * sqrt(large)), power);
                 return vec3f(level, power, beyond);
             }
@@ -115,5 +100,5 @@ fn noise() {
     }
     measured[2] = select(0.0, middle, len >= LEAST_SAMPLE);
     let usual = found.x * select(pow(min(middle / found.z, 1.0), found.y), 1.0, found.y == 0.0);
-    measured[3] = f32(select(FINE_SHEETS, COARSE_SHEETS, usual > THICK_NOISE * measured[2]));
+    measured[3] = f32(select(SHEET_LEVELS[0], SHEET_LEVELS[1], usual > THICK_NOISE * measured[2]));
 }

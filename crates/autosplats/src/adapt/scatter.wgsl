@@ -3,12 +3,13 @@
 // Reads: counters, density, surfels, levels, clusters, sampled. Writes: scatters, ball size by ball size.
 
 #import frame
-#import groups
-#import counters
 #import base_radius
+#import groups
+#import levels
 #import quadric
-#import together
 #import scatters
+#import surfel
+#import together
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -17,10 +18,6 @@
 @group(0) @binding(5) var<storage, read> clusters: array<vec4f>;
 @group(0) @binding(6) var<storage, read> sampled: array<u32>;
 @group(0) @binding(7) var<storage, read_write> scatters: array<u32>;
-
-override MOST_SAMPLED: u32;
-override THIN_SCATTER_RADII: f32;
-override ROUNDING_SCATTER_RADII: f32;
 
 @compute @workgroup_size(TOGETHER)
 fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {

@@ -5,14 +5,17 @@
 // Reads: density, levels, clusters, measured, depth_noise. Reads and writes: counters, surfels.
 
 #import frame
-#import groups
-#import counters
 #import base_radius
 #import calls
 #import depth_noise
-#import together
+#import groups
+#import levels
+#import noise
+#import round
 #import rows
 #import shrink
+#import surfel
+#import together
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -22,8 +25,6 @@
 @group(0) @binding(6) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(7) var<storage, read_write> surfels: array<Surfel>;
 
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
 // Surfels of a workgroup.
 override ITEMS_PER_GROUP: u32;
 

@@ -4,13 +4,14 @@
 // Reads: counters, density, points, source, queries, neighborhoods. Writes: surfels, counters.
 
 #import frame
-#import groups
-#import counters
 #import density
+#import eigen
+#import groups
+#import neighborhood
+#import orthonormal
+#import round
 #import screen
 #import surfel
-#import eigen
-#import orthonormal
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -19,26 +20,6 @@
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
 @group(0) @binding(6) var<storage, read> neighborhoods: array<Neighborhood>;
 @group(0) @binding(7) var<storage, read_write> surfels: array<Surfel>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
-override MAX_LINE_EIGENVALUE_RATIO: f32;
-override MIN_LINE_SINE: f32;
-override MIN_SCAN_LINE_NEIGHBORS: f32;
-override ISOLATED_DOT_RADIUS_PX: f32;
-override DOT_CURVATURE: f32;
-override MAX_CULLED_FIRST_RADII: f32;
-override MAX_MEAN_OFFSET_K_RADII: f32;
-override MAX_SPARSE_MEAN_OFFSET_K_RADII: f32;
-override SPARSE_FIRST_RADII: f32;
-override MIN_COMPARED_NEIGHBORS: f32;
-override MAX_PLANE_OFFSET_K_RADII: f32;
-override MIN_FLAT_OFFSET_RATIO: f32;
-override FEW_NEIGHBORS: f32;
-override FEW_NEIGHBORS_FIRST_RADII: f32;
-override MIN_SURFACE_POINTS: u32;
-
-const MIN_POSITIVE = 1.1754943508222875e-38;
 
 // Values that all queries of a workgroup share.
 struct Task {

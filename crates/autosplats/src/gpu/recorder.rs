@@ -8,7 +8,7 @@ use super::pass::{Groups, Step, StepWork};
 use crate::Error;
 
 /// Workgroups in a row of a dispatch. More than 65535 need a second dimension, which `shared/groups.wgsl` undoes.
-pub(crate) const GROUPS_PER_ROW: u32 = 32768;
+pub(super) const GROUPS_PER_ROW: u32 = 32768;
 
 /// Most passes of a frame that can be timed.
 const MOST_PASSES: u32 = 512;

@@ -1,14 +1,13 @@
-// Counts the screen points of each block of 2048 slots in cell order. Counts the screen points of each density cell
+// Counts the screen points of each block of slots in cell order. Counts the screen points of each density cell
 // and finds its nearest depth [Paper, §5.1].
 //
 // Reads: keys, counters. Writes: block_sums, density.
 
 #import frame
-#import groups
-#import counters
-#import keys
-#import density
 #import cell_order
+#import density
+#import groups
+#import keys
 
 @group(0) @binding(1) var<storage, read> keys: array<vec2u>;
 @group(0) @binding(2) var<storage, read> counters: array<u32>;
@@ -28,8 +27,8 @@ fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let cell_px = counters[CELL_PX];
     let cell_columns = counters[CELL_COLUMNS];
     var own = 0u;
-    for (var step = 0u; step < 8u; step++) {
-        let at = block * 2048u + step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
+        let at = block * RANK_BLOCK_FLAGS + step * 256u + local;
         if at < arrayLength(&keys) {
             let place = cell_slot(at, strip_px);
             let key = keys[place.slot];

@@ -5,12 +5,10 @@
 // Reads: a chunk of the cloud, turn. Writes: keys, as pairs of atomics; counters, sixteenths.
 
 #import frame
-#import groups
-#import counters
-#import half
-#import project_point
-#import count_dropped
 #import add_sixteenth
+#import count_dropped
+#import groups
+#import project_point
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> positions: array<f32>;

@@ -3,14 +3,11 @@
 // Reads: points, density, block_sums. Writes: queries, passive, counters.
 
 #import frame
-#import picture
-#import groups
-#import counters
-#import rank
-#import density
-#import screen
-#import matters
 #import culled
+#import groups
+#import matters
+#import rank
+#import screen
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -25,9 +22,9 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let block = group_index(workgroup);
     let visible = counters[VISIBLE];
     var is_active = 0u;
-    for (var step = 0u; step < 8u; step++) {
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
         let flag = step * 256u + local;
-        let index = block * 2048u + flag;
+        let index = block * RANK_BLOCK_FLAGS + flag;
         if index < visible && matters(points[index]) && !is_culled(points[index]) {
             rank_set(flag);
             is_active |= 1u << step;
@@ -35,9 +32,9 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     rank_finish(local);
     let active_before = block_sums[block];
-    for (var step = 0u; step < 8u; step++) {
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
         let flag = step * 256u + local;
-        let index = block * 2048u + flag;
+        let index = block * RANK_BLOCK_FLAGS + flag;
         let before = active_before + rank_of(flag);
         if index < visible {
             if (is_active & (1u << step)) != 0u {

@@ -1,15 +1,12 @@
-// Counts the active points of each block of 2048 screen points: points that matter and that grid culling keeps.
+// Counts the active points of each block of screen points: points that matter and that grid culling keeps.
 //
 // Reads: points, density, counters. Writes: block_sums.
 
 #import frame
-#import picture
-#import groups
-#import counters
-#import density
-#import screen
-#import matters
 #import culled
+#import groups
+#import matters
+#import screen
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -27,8 +24,8 @@ fn split_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     let block = group_index(workgroup);
     let visible = counters[VISIBLE];
     var own = 0u;
-    for (var step = 0u; step < 8u; step++) {
-        let index = block * 2048u + step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
+        let index = block * RANK_BLOCK_FLAGS + step * 256u + local;
         if index < visible && matters(points[index]) && !is_culled(points[index]) {
             own += 1u;
         }

@@ -4,11 +4,10 @@
 // Reads: surface, cover, extras, counters, color_map, tables. Writes: image, linear.
 
 #import frame
-#import picture
-#import groups
 #import divide
-#import counters
+#import groups
 #import layers
+#import picture
 #import shading
 #import srgb
 
@@ -23,16 +22,8 @@
 @group(0) @binding(8) var<storage, read_write> image: array<u32>;
 @group(0) @binding(9) var<storage, read_write> linear: array<vec4f>;
 
-// Whether backs are toned; shares of light and of colour left on them.
+// Whether backs are toned.
 override BACKS: bool;
-override BACK_LIGHT: f32;
-override BACK_COLOR: f32;
-
-// Weights of red, green and blue in the brightness of a linear colour.
-const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
-
-// Distance from a border, in pixels, at which the inner depth and normal are read.
-override INNER_NORMAL_PX: i32;
 
 // The linear colour of a value. An unknown value gets the colour of the lower end; in a range without width every value
 // gets the middle colour.

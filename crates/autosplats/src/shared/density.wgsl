@@ -1,6 +1,7 @@
 // The low-resolution grid of [Paper, §5.1]: square cells of about k screen points. x of a cell is its number of screen
-// points, y the bits of its nearest depth. Imports: frame. The including pass binds `density` and `counters`.
+// points, y the bits of its nearest depth. The including pass binds `density` and `counters`.
 
+#import frame
 #import divide
 
 // Index of the density cell of a pixel.

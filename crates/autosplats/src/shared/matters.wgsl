@@ -1,9 +1,9 @@
 // Whether a screen point's splat may affect the picture: the point is in the picture or near its edge. Near is relative
-// to the local point density. Imports: frame, density, screen, counters, picture. The including pass binds `density`
-// and `counters`.
+// to the local point density. The including pass binds `density` and `counters`.
 
-// Largest distance from the picture in first search radii: see `project/mod.rs`.
-override MARGIN_REACH: f32;
+#import density
+#import picture
+#import screen
 
 fn matters(point: ScreenPoint) -> bool {
     let pixel = pixel_xy(point.pixel);

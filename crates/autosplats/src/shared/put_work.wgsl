@@ -1,4 +1,4 @@
-// Number of workgroups of an indirect dispatch. The including pass binds `arguments`. Imports: groups.
+// Number of workgroups of an indirect dispatch. The including pass binds `arguments`.
 
 // Sets the arguments of dispatch number `kind`; each workgroup takes `per_group` of the `items`.
 fn put_work(kind: u32, items: u32, per_group: u32) {

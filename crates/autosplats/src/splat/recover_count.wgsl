@@ -1,18 +1,15 @@
-// Marks and counts, per block of 2048, the passive points that matter to the picture and may be visible despite the
+// Marks and counts, per block, the passive points that matter to the picture and may be visible despite the
 // depth map [Paper, §7, Grid Culling].
 //
 // Reads: points, counters, density, depth_map. Reads and writes: passive. Writes: block_sums.
 
 #import frame
-#import picture
-#import groups
-#import counters
 #import density
-#import screen
-#import matters
-#import depth_map
+#import groups
 #import hidden
+#import matters
 #import recovered
+#import screen
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read_write> passive: array<u32>;
@@ -20,9 +17,6 @@
 @group(0) @binding(4) var<storage, read> density: array<vec2u>;
 @group(0) @binding(5) var<storage, read> depth_map: array<u32>;
 @group(0) @binding(6) var<storage, read_write> block_sums: array<u32>;
-
-// In first search radii; see `splat/setup.rs`.
-override RECOVER_DISTANCE_RADII: f32;
 
 var<workgroup> recovered_points: atomic<u32>;
 
@@ -34,8 +28,8 @@ fn recover_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocat
     workgroupBarrier();
     let block = group_index(workgroup);
     var own = 0u;
-    for (var step = 0u; step < 8u; step++) {
-        let index = block * 2048u + step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
+        let index = block * RANK_BLOCK_FLAGS + step * 256u + local;
         if index < counters[PASSIVE] {
             let passive_point = passive[index];
             if matters(points[passive_point]) && is_back(points[passive_point]) {

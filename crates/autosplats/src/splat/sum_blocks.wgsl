@@ -4,10 +4,10 @@
 // Reads: cover, sixteenths, measured. Writes: blocks.
 
 #import frame
-#import picture
+#import blocks
 #import groups
 #import layers
-#import blocks
+#import picture
 
 @group(0) @binding(1) var<storage, read> cover: array<Cover>;
 @group(0) @binding(2) var<storage, read> sixteenths: array<u32>;

@@ -10,8 +10,6 @@ use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::test_clouds::{self, noisy};
 
-/// Clusters of a cell that are contiguous on the device.
-pub(crate) const BUNCH: usize = 4;
 /// Share of cells that may differ: rounding moves a few means into the next slab.
 const UNLIKE_CELLS: f64 = 1e-3;
 /// Share of surfels that may differ: rounding decides whether a ball is the last.
@@ -233,15 +231,6 @@ fn however_many_sum_up_a_ball_the_device_adapts_as_the_host_does() {
                 .unwrap_or_else(|error| panic!("{name}, {together}: {error}"));
         }
     }
-}
-
-#[test]
-fn sheets_are_as_large_as_the_host_takes_them_for() {
-    let source = crate::gpu::link("#import sheet\n");
-    let module = wgpu::naga::front::wgsl::parse_str(&source).expect("WGSL");
-    let is_sheet = |ty: &wgpu::naga::Type| ty.name.as_deref() == Some("Sheet");
-    let sheet = module.types.iter().find(|(_, ty)| is_sheet(ty)).expect("a sheet").1;
-    assert_eq!(sheet.inner.size(module.to_ctx()) as usize, size_of::<Sheet>());
 }
 
 #[test]

@@ -8,18 +8,16 @@
 // Reads: counters, density, cell_start, points, queries, left, past. Writes: neighborhoods, counters.
 
 #import frame
-#import groups
-#import counters
 #import density
 #import gaps
+#import groups
+#import nearest
+#import neighborhood
+#import past
 #import screen
-#import surfel
+#import search_task
 #import window
 #import window_points
-#import nearest
-#import search_task
-#import reproject
-#import past
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -30,8 +28,6 @@
 @group(0) @binding(7) var<storage, read> left: array<u32>;
 @group(0) @binding(8) var<storage, read> past: array<u32>;
 
-override MIN_RADIUS_GROWTH: f32;
-override OUTLIER_RADIUS_SLACK: f32;
 // Whether to search only the queries in `left`, whose searches `search_four` did not finish.
 override LEFT_ONLY: bool;
 

@@ -11,16 +11,14 @@
 // Reads: counters, density, cell_start, points, queries, past. Writes: neighborhoods, left, counters.
 
 #import frame
-#import groups
-#import counters
 #import density
+#import groups
+#import neighborhood
+#import past
 #import screen
-#import surfel
+#import search_task
 #import window
 #import window_points
-#import search_task
-#import reproject
-#import past
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;

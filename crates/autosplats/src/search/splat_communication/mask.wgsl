@@ -5,19 +5,14 @@
 // depth mask.
 
 #import frame
-#import counters
+#import communication
 #import density
 #import screen
-#import communication
-#import window
 #import splat_box
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
 @group(0) @binding(3) var<storage, read> counters: array<u32>;
-
-// A radius that rounds to 0 would never grow.
-const MIN_POSITIVE = 1.1754943508222875e-38;
 
 struct Splat {
     @builtin(position) position: vec4f,

@@ -8,21 +8,23 @@ use super::super::light::{CLAY, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WR
 use super::super::occlusion::{FARTHEST_RISE, MAX_FULL_RISE, MIN_RISE, PAIR_COUNT, pairs};
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
+use crate::gpu::indices;
 use crate::splat::{Channels, LayerBuffers};
 
-/// What colours a surface, numbered as in `shared/shading.wgsl`; from [`Height`](Self::Height) on these are values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the colour modes, resolved")]
-pub(crate) enum ShownQuantity {
-    Clay,
-    Color,
-    Normal,
-    Height,
-    Depth,
-    Radius,
-    KRadius,
-    Curvature,
-    Scalar,
+indices! {
+    /// What colours a surface; from [`Height`](Self::Height) on these are values.
+    #[allow(missing_docs, reason = "the colour modes, resolved")]
+    pub(crate) enum ShownQuantity in "Show" {
+        Clay,
+        Color,
+        Normal,
+        Height,
+        Depth,
+        Radius,
+        KRadius,
+        Curvature,
+        Scalar,
+    }
 }
 
 impl ShownQuantity {
@@ -41,7 +43,7 @@ impl ShownQuantity {
     }
 }
 
-/// Settings and constants of shading, in the layout of `shared/shading.wgsl`.
+/// Settings and constants of shading, in the layout of `imports/shading.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ShadeUniform {

@@ -1,0 +1,102 @@
+// Uniform of shading, beside the frame's, and the values that shading can show. The including pass binds `surface`,
+// `cover` and `extras`.
+
+#import frame
+
+struct ShadeUniform {
+    // Directions to the lights in view space (`key`, `fill`), and their linear colours.
+    key: vec3f,
+    // Amount by which the key light reaches surfaces turned away from it.
+    key_wrap: f32,
+    key_light: vec3f,
+    // Brightness above which lit colours are compressed.
+    shoulder: f32,
+    fill: vec3f,
+    // Strength of the darkening by occlusion.
+    darkening: f32,
+    fill_light: vec3f,
+    // Steepest rise beside a pixel that occludes in full, and the rise that far things count as.
+    steepest: f32,
+    // Light of ground and sky, on surfaces that face down and up.
+    ground: vec3f,
+    furthest: f32,
+    sky: vec3f,
+    // Least divisor for a rise.
+    least_rise: f32,
+    // Linear colour of a surface without colours.
+    clay: vec3f,
+    // A depth larger than a pixel's depth times this factor plus the offset belongs to another surface.
+    edge_factor: f32,
+    // Direction of rising height, world space.
+    up: vec3f,
+    edge_offset: f32,
+    // Light independent of the normal, and the share of the lights above.
+    given_light: vec2f,
+    // Ends of the colour map, unless `find_range` is set.
+    range: vec2f,
+    find_range: u32,
+    lighting: u32,
+    keep_linear: u32,
+    // 1 if the bytes of the image are blue, green, red.
+    swap_red_blue: u32,
+    // Pixels from one row of the image to the next.
+    pitch: u32,
+    // Sampling of pixels to find the range: step, and number of samples.
+    sample_step: u32,
+    samples: u32,
+    // Number of steps of the table from linear to sRGB.
+    encode_steps: u32,
+    // Start of the rows' backgrounds in the tables.
+    backgrounds: u32,
+    // Start of the measures in `extras`.
+    measures: u32,
+    // Distance in pixels within which the ends of a row of edges are searched.
+    edge_search: i32,
+    // Difference of tilt towards a border from which a pixel uses the normal further in instead of its own.
+    less_tilted: f32,
+    // Pairs of pixels for occlusion: step to the second pixel, inverse length of the step in pixels, and weight of the
+    // pair.
+    pairs: array<vec4f, PAIR_COUNT>,
+}
+
+@group(0) @binding(1) var<uniform> shading: ShadeUniform;
+
+// What the surface is coloured by. A constant, because software devices run all branches.
+override SHOWN: u32;
+
+// Whether a surface covers a pixel of this depth.
+fn is_covered(depth: f32) -> bool {
+    return is_finite(depth);
+}
+
+// Rotates a direction from view to world space.
+fn to_world(direction: vec3f) -> vec3f {
+    let m = frame.view_from_world;
+    return vec3f(dot(m[0], direction), dot(m[1], direction), dot(m[2], direction));
+}
+
+// Value shown at a pixel of the picture; `index` is the pixel's index on the screen. Heights are relative to the
+// cloud's origin.
+fn shown_value(pixel: vec2u, index: u32, depth: f32) -> f32 {
+    switch SHOWN {
+        case SHOW_HEIGHT: {
+            let position_view = unproject(vec2f(pixel + frame.margin) + 0.5, depth);
+            return dot(to_world(position_view) + frame.eye_local, shading.up);
+        }
+        case SHOW_RADIUS: {
+            return extras[shading.measures + index].x;
+        }
+        case SHOW_K_RADIUS: {
+            return extras[shading.measures + index].y;
+        }
+        case SHOW_CURVATURE: {
+            return extras[shading.measures + index].z;
+        }
+        case SHOW_SCALAR: {
+            return cover[index].scalar;
+        }
+        default: {
+            return depth;
+        }
+    }
+}
