@@ -9,7 +9,7 @@
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> levels: array<Level>;
-@group(0) @binding(3) var<storage, read_write> arguments: array<u32>;
+@group(0) @binding(3) var<storage, read_write> arguments: array<Dispatch>;
 @group(0) @binding(4) var<storage, read_write> picked: array<u32>;
 
 override MOST_FINEST: u32;
@@ -46,7 +46,7 @@ fn arrange() {
         put_work(index, cells, 64u);
         // The finest level that may have sheets has the most cells.
         if index == SHEET_LEVELS[0] {
-            put_work(MOST_LEVELS, cells, ITEMS_PER_GROUP);
+            put_work(WORK_SHEETS, cells, ITEMS_PER_GROUP);
         }
         level.side_px *= 2u;
         level.columns = (level.columns + 1u) / 2u;

@@ -7,7 +7,7 @@
 #import sheet
 
 @group(0) @binding(0) var<storage, read> levels: array<Level>;
-@group(0) @binding(1) var<storage, read_write> asked: array<u32>;
+@group(0) @binding(1) var<storage, read_write> asked: array<Asked>;
 @group(0) @binding(2) var<storage, read_write> sheets: array<Sheet>;
 
 @compute @workgroup_size(64)
@@ -15,9 +15,7 @@ fn forget(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let level = levels[SHEET_LEVELS[0]];
     let cell = group_index(workgroup) * 64u + local;
     if cell < level.columns * level.rows {
-        asked[3u * cell] = 0u;
-        asked[3u * cell + 1u] = 0u;
-        asked[3u * cell + 2u] = 0xffffffffu;
+        asked[cell] = Asked(0u, 0u, NO_POINT);
         for (var index = 0u; index < SHEETS; index++) {
             sheets[cell * SHEETS + index].radius = UNKNOWN;
         }

@@ -2,12 +2,12 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::depth::{DepthNoise, DepthRun};
-use super::noise::{MOST_SAMPLED, STEADY_SCALES};
+use super::noise::{FrameStatistics, MOST_SAMPLED, STEADY_SCALES};
 use super::sheets::{SHEET_LEVELS, SHEETS};
 use super::{self as adapt, SCALES, cells, depth, noise, quadric, rows, rules, sheets, through};
 use crate::Error;
 use crate::fit::{self, Surfel};
-use crate::gpu::{Gpu, Groups, Library, Pass, Step, constants, files, passes};
+use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, Step, constants, files, passes};
 use crate::project::gpu::{Counter, Round, ScreenBuffers, few};
 
 /// Imports and constants of the passes.
@@ -68,7 +68,7 @@ const LIBRARY: Library = Library {
             CELLS_TO_COUNT, LEAST_ON, MAX_SURFACE_MEAN_RADII, MAX_SURFACE_VARIATION, MIN_SURFACE_WIDTH_RATIO,
             MIN_TESTED_FIRST_RADII, ON_DISC, ON_DISC_NOISE, SURFACE_BALL_K_RADII
         ),
-        constants![BUNCH, SAMPLE_PARTS],
+        constants![BUNCH, SAMPLE_PARTS, WORK_SHEETS],
     ],
 };
 
@@ -97,17 +97,26 @@ const TOGETHER: [u32; 2] = [32, 8];
 const BUNCH: usize = 4;
 /// Parts of the sample that have quantiles: its densest third, its sparsest third, all, and all by steady shares.
 const SAMPLE_PARTS: usize = 4;
-/// Numbers that `noise.wgsl` writes.
-pub(crate) const NOISE_FLOATS: usize = 6;
-/// Bytes of the arguments of a dispatch.
-const WORK_BYTES: u64 = 12;
+/// Index of the dispatch that fits sheets; those before it fill the levels.
+const WORK_SHEETS: usize = MOST_LEVELS;
 
 /// `Level` of `imports/levels.wgsl`: side, columns, rows and first cell.
 type Level = [u32; 4];
+/// Kind and value.
+type Quantile = [u32; 2];
 /// Mean and count.
 type Cluster = [f32; 4];
 /// `Sheet` of `imports/sheet.wgsl`, padded.
 type Sheet = [f32; 16];
+
+/// Surfels that ask for the sheets of a cell, laid out as in `imports/sheet.wgsl`.
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Asked {
+    pub(crate) count: u32,
+    pub(crate) k_radii: u32,
+    pub(crate) point: u32,
+}
 
 /// Buffers that the stage keeps on the device from pass to pass.
 #[derive(Debug)]
@@ -116,7 +125,7 @@ pub(crate) struct AdaptBuffers {
     /// Workgroups that fill each level, three `u32`, then those that fit sheets.
     arguments: wgpu::Buffer,
     clusters: wgpu::Buffer,
-    /// Per cell: number of surfels that ask for sheets, sum of their k-radii, smallest point index.
+    /// [`Asked`] per cell.
     asked: wgpu::Buffer,
     sheets: wgpu::Buffer,
     /// Indices of the sampled surfels, then their number. `picked` is unordered, `sampled` is sorted by k-radius.
@@ -125,8 +134,8 @@ pub(crate) struct AdaptBuffers {
     scatters: wgpu::Buffer,
     /// Quantiles, then the steady shares of the first scales.
     quantiles: wgpu::Buffer,
-    /// Noise level and power, median k-radius, level of cells with sheets, largest k-radius of growth, certainty.
-    measured: wgpu::Buffer,
+    /// [`FrameStatistics`].
+    statistics: wgpu::Buffer,
     /// Owned by [`DepthNoiseBuffer`].
     depth_noise: wgpu::Buffer,
 }
@@ -143,24 +152,24 @@ impl AdaptBuffers {
             levels: gpu.storage::<Level>("levels of cells", MOST_LEVELS)?,
             arguments: gpu.buffer(
                 "arguments of levels",
-                (MOST_LEVELS as u64 + 1) * WORK_BYTES,
+                (WORK_SHEETS as u64 + 1) * DISPATCH_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
             clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size, most_finest))?,
-            asked: gpu.storage::<[u32; 3]>("surfels that ask for sheets", sheet_cells)?,
+            asked: gpu.storage::<Asked>("surfels that ask for sheets", sheet_cells)?,
             sheets: gpu.storage::<[Sheet; SHEETS]>("sheets", sheet_cells)?,
             picked: gpu.storage::<u32>("picked surfels", MOST_SAMPLED + 1)?,
             sampled: gpu.storage::<u32>("sampled surfels", MOST_SAMPLED + 1)?,
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * MOST_SAMPLED)?,
-            quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", SAMPLE_PARTS * SCALES + STEADY_SCALES)?,
-            measured: gpu.storage::<f32>("noise", NOISE_FLOATS)?,
+            quantiles: gpu.storage::<Quantile>("quantiles of scatter", SAMPLE_PARTS * SCALES + STEADY_SCALES)?,
+            statistics: gpu.storage::<FrameStatistics>("statistics of surfels", 1)?,
             depth_noise: known.runs.clone(),
         })
     }
 
-    /// The measured noise, in the layout of `shared/noise.wgsl`.
+    /// [`FrameStatistics`], with the measured noise.
     pub(crate) fn noise(&self) -> &wgpu::Buffer {
-        &self.measured
+        &self.statistics
     }
 }
 
@@ -291,7 +300,7 @@ impl AdaptPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, cell_start, points, .. } = screen;
         let AdaptBuffers { levels, arguments, clusters, asked, sheets, picked, .. } = buffers;
-        let groups = |level: usize| Groups::Counted(arguments.clone(), level as u64 * WORK_BYTES);
+        let groups = |level: usize| Groups::Counted(arguments.clone(), level as u64 * DISPATCH_BYTES);
         let mut steps = vec![
             self.arrange.step(gpu, &[frame, counters, levels, arguments, picked], 1),
             self.fill.step(gpu, &[frame, counters, levels, cell_start, points, clusters], groups(0)),
@@ -314,7 +323,7 @@ impl AdaptPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
         let AdaptBuffers { levels, arguments, clusters, asked, sheets, .. } = buffers;
-        let AdaptBuffers { picked, sampled, scatters, quantiles, measured, depth_noise, .. } = buffers;
+        let AdaptBuffers { picked, sampled, scatters, quantiles, statistics, depth_noise, .. } = buffers;
         let mut steps = Vec::new();
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
@@ -323,17 +332,17 @@ impl AdaptPasses {
                 self.sample.step(gpu, &[surfels, picked, sampled], MOST_SAMPLED.div_ceil(GROUP) as u32),
                 self.scatter.step(gpu, &balls, (SCALES * MOST_SAMPLED) as u32),
                 self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], (SAMPLE_PARTS * SCALES) as u32),
-                self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
+                self.noise.step(gpu, &[frame, surfels, sampled, quantiles, statistics], 1),
             ]);
         }
-        let ask = [frame, counters, levels, measured, surfels, depth_noise, asked];
-        let fit = [frame, levels, clusters, measured, asked, depth_noise, sheets];
-        let adapt = [frame, counters, density, levels, clusters, measured, sheets, depth_noise, surfels];
-        let turn_rows = [frame, counters, density, levels, clusters, measured, depth_noise, surfels];
+        let ask = [frame, counters, levels, statistics, surfels, depth_noise, asked];
+        let fit = [frame, levels, clusters, statistics, asked, depth_noise, sheets];
+        let adapt = [frame, counters, density, levels, clusters, statistics, sheets, depth_noise, surfels];
+        let turn_rows = [frame, counters, density, levels, clusters, statistics, depth_noise, surfels];
         let round_at = round as usize;
         steps.extend([
             self.ask[round_at].step(gpu, &ask, screen.groups(round.work_64())),
-            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), MOST_LEVELS as u64 * WORK_BYTES)),
+            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), WORK_SHEETS as u64 * DISPATCH_BYTES)),
             self.adapt[round_at].step(gpu, &adapt, screen.groups(round.work_64())),
             self.turn_rows[round_at].step(gpu, &turn_rows, screen.groups(round.work_few())),
         ]);

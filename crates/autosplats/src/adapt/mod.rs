@@ -51,7 +51,7 @@ pub(crate) use cpu::Adapter;
 pub(crate) use depth::DepthNoise;
 #[cfg(test)]
 pub(crate) use depth::DepthRun;
-pub(crate) use noise::Noise;
+pub(crate) use noise::{FrameStatistics, Noise};
 pub(crate) use rules::AdaptRules;
 
 /// Number of balls tried around each point, besides the neighbourhood that the search found.

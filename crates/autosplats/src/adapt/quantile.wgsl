@@ -1,8 +1,8 @@
 // Quantiles of scatter, a workgroup each: for every ball size of the sample's densest third, of its sparsest third, of
 // all, and of all by steady shares.
 //
-// Reads: sampled, scatters. Writes: quantiles, each as its kind and its bits. After them, for each of the first sizes,
-// the bits of the steady share of the largest size up to it that has one; below 0 if none has.
+// Reads: sampled, scatters. Writes: quantiles. After them, for each of the first sizes, the steady share of the largest
+// size up to it that has one; below 0 if none has.
 
 #import frame
 #import quantiles
@@ -10,7 +10,7 @@
 
 @group(0) @binding(1) var<storage, read> sampled: array<u32>;
 @group(0) @binding(2) var<storage, read> scatters: array<u32>;
-@group(0) @binding(3) var<storage, read_write> quantiles: array<vec2u>;
+@group(0) @binding(3) var<storage, read_write> quantiles: array<Quantile>;
 
 // Balls that hold enough to fit, and thin balls: of the workgroup's size, then of the next.
 var<workgroup> fitted: array<atomic<u32>, 2>;
@@ -114,10 +114,10 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         for (var size = 1u; size <= scale; size++) {
             of_largest = select(of_largest, steady_share(size), steady_share(size) >= 0.0);
         }
-        quantiles[SAMPLE_PARTS * SCALES + scale] = vec2u(TOO_FEW_BALLS, bitcast<u32>(of_largest));
+        quantiles[SAMPLE_PARTS * SCALES + scale] = Quantile(TOO_FEW_BALLS, of_largest);
     }
     if local == 0u {
         let tells = select(OF_ALL_BALLS, OF_THIN_BALLS, is_thin);
-        quantiles[workgroup.x] = vec2u(select(TOO_FEW_BALLS, tells, all_fitted >= least), found);
+        quantiles[workgroup.x] = Quantile(select(TOO_FEW_BALLS, tells, all_fitted >= least), bitcast<f32>(found));
     }
 }

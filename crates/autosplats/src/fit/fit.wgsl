@@ -14,7 +14,7 @@
 #import surfel
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(4) var<storage, read> source: array<u32>;
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
@@ -128,7 +128,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     let center = point.position_view;
     let face = plane(sums, to_eye(center));
     let cell = density[density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns)];
-    let first = first_radius(cell.x, task.cell_px, center.z);
+    let first = initial_radius_of(cell.count, task.cell_px, center.z);
 
     var radius = 0.0;
     if sums.count > 0.0 {
@@ -140,7 +140,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     if frame.keep_outliers == 0u && is_outlier(sums, face, sparser) {
         radius = 0.0;
     }
-    if center.z > culling_depth(bitcast<f32>(cell.y), task.cell_px) {
+    if center.z > culling_depth(cell.nearest, task.cell_px) {
         radius = min(radius, splat_radius(MAX_CULLED_FIRST_RADII * first, f32(frame.k)));
     }
     let screen_and_flags = query | select(0u, LINE, face.is_line);

@@ -89,7 +89,7 @@ const SHARED: Library = Library {
         "density", "divide", "eigen", "frame", "groups", "half", "layers", "matters", "moved", "neighborhood",
         "noise", "orthonormal", "picture", "project_point", "put_work", "range_keys", "rank", "reproject", "round", "screen", "surfel",
     )],
-    constants: &[constants![GROUPS_PER_ROW, MAX_F32 = f32::MAX, MIN_POSITIVE = f32::MIN_POSITIVE]],
+    constants: &[constants![GROUPS_PER_ROW, MAX_F32 = f32::MAX, MIN_POSITIVE = f32::MIN_POSITIVE, NO_POINT = u32::MAX]],
 };
 
 /// A value that constants of WGSL may have.

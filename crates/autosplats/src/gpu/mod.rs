@@ -24,4 +24,4 @@ pub(crate) use link::{Constant, File, InWgsl, Library, constants, files, indices
 pub(crate) use pass::{Groups, Pass, PassSource, Step, passes};
 pub(crate) use raster::{DepthMask, Draw, Load, RasterPass, Target, Targets};
 pub use recorder::PassTime;
-pub(crate) use recorder::{Clock, Recorder, stage_ms};
+pub(crate) use recorder::{Clock, DISPATCH_BYTES, Recorder, stage_ms};

@@ -8,7 +8,7 @@
 #import keys
 #import rank
 
-@group(0) @binding(1) var<storage, read> keys: array<vec2u>;
+@group(0) @binding(1) var<storage, read> keys: array<Key>;
 @group(0) @binding(2) var<storage, read> counters: array<u32>;
 @group(0) @binding(3) var<storage, read> block_sums: array<u32>;
 @group(0) @binding(4) var<storage, read_write> source: array<u32>;
@@ -24,7 +24,7 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         let flag = step * 256u + local;
         let at = block * RANK_BLOCK_FLAGS + flag;
         if at < arrayLength(&keys) {
-            if keys[cell_slot(at, strip_px).slot].x != EMPTY_KEY {
+            if keys[cell_slot(at, strip_px).slot].point != NO_POINT {
                 rank_set(flag);
             }
         }
@@ -41,8 +41,8 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
                 cell_start[place.cell] = index;
             }
             let key = keys[place.slot];
-            if key.x != EMPTY_KEY {
-                source[index] = key.x;
+            if key.point != NO_POINT {
+                source[index] = key.point;
                 pixels[index] = (place.pixel.y << 16u) | place.pixel.x;
             }
         }

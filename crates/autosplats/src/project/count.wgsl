@@ -9,10 +9,16 @@
 #import groups
 #import keys
 
-@group(0) @binding(1) var<storage, read> keys: array<vec2u>;
+@group(0) @binding(1) var<storage, read> keys: array<Key>;
 @group(0) @binding(2) var<storage, read> counters: array<u32>;
 @group(0) @binding(3) var<storage, read_write> block_sums: array<u32>;
-@group(0) @binding(4) var<storage, read_write> density: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> density: array<CountedCell>;
+
+// A density cell with atomics. Depths, which are positive, have the order of their bits.
+struct CountedCell {
+    count: atomic<u32>,
+    nearest: atomic<u32>,
+}
 
 var<workgroup> owned: atomic<u32>;
 
@@ -32,11 +38,11 @@ fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         if at < arrayLength(&keys) {
             let place = cell_slot(at, strip_px);
             let key = keys[place.slot];
-            if key.x != EMPTY_KEY {
+            if key.point != NO_POINT {
                 own += 1u;
                 let cell = density_cell(place.pixel, cell_px, cell_columns);
-                atomicAdd(&density[2u * cell], 1u);
-                atomicMin(&density[2u * cell + 1u], key.y);
+                atomicAdd(&density[cell].count, 1u);
+                atomicMin(&density[cell].nearest, key.depth);
             }
         }
     }

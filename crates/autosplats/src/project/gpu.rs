@@ -4,11 +4,11 @@ pub(crate) use super::Round;
 use super::device_cloud::{Chunk, DeviceCloud};
 use super::{MARGIN_REACH, ScreenPoint, cpu};
 use crate::Error;
-use crate::gpu::{Gpu, Groups, INT64_ATOMICS, Library, Pass, Step, constants, files, indices, passes};
+use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, INT64_ATOMICS, Library, Pass, Step, constants, files, indices, passes};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
-    files: &[files!["add_sixteenth", "cell_order", "count_dropped", "culled", "keys"]],
+    files: &[files!["active", "add_sixteenth", "cell_order", "count_dropped", "keys"]],
     constants: &[
         Counter::CONSTANTS,
         Work::CONSTANTS,
@@ -86,9 +86,6 @@ pub(crate) fn few(gpu: &Gpu) -> u32 {
     if gpu.is_software() { 16 } else { 4 }
 }
 
-/// Bytes of the arguments of an indirect dispatch.
-const WORK_BYTES: u64 = 12;
-
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = 256;
 /// Flags that one workgroup ranks: a block.
@@ -136,6 +133,14 @@ indices! {
 /// Length of [`ScreenBuffers::counters`].
 pub(crate) const COUNTERS: usize = Counter::CONSTANTS.len();
 
+/// A cell of the density grid, laid out as in `shared/density.wgsl`.
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct DensityCell {
+    pub(crate) count: u32,
+    pub(crate) nearest: f32,
+}
+
 /// [`ScreenPoints`](super::ScreenPoints) on the device.
 #[derive(Debug)]
 pub(crate) struct ScreenBuffers {
@@ -147,7 +152,7 @@ pub(crate) struct ScreenBuffers {
     /// One `u32` per [`Counter`].
     pub(crate) counters: wgpu::Buffer,
     keys: wgpu::Buffer,
-    /// Count and bits of the nearest depth, per density cell.
+    /// [`DensityCell`]s.
     pub(crate) density: wgpu::Buffer,
     /// Index of the first screen point of each cell.
     pub(crate) cell_start: wgpu::Buffer,
@@ -192,7 +197,7 @@ impl ScreenBuffers {
             counters: gpu.storage::<u32>("counters", COUNTERS)?,
             keys: gpu.storage::<[u32; 2]>("keys of pixels", slots)?,
             // Cells are two pixels wide at least.
-            density: gpu.storage::<[u32; 2]>("density grid", width.div_ceil(2) * height.div_ceil(2))?,
+            density: gpu.storage::<DensityCell>("density grid", width.div_ceil(2) * height.div_ceil(2))?,
             cell_start: gpu.storage::<u32>("starts of cells", pixels + 1)?,
             sixteenths: gpu.storage::<u32>("sixteenths of pixels", pixels.div_ceil(2))?,
             source: gpu.storage::<u32>("sources of screen points", capacity)?,
@@ -205,7 +210,7 @@ impl ScreenBuffers {
             block_sums: gpu.storage::<u32>("sums of blocks", slots.div_ceil(RANK_BLOCK_FLAGS as usize))?,
             arguments: gpu.buffer(
                 "arguments",
-                Work::CONSTANTS.len() as u64 * WORK_BYTES,
+                Work::CONSTANTS.len() as u64 * DISPATCH_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
         })
@@ -213,7 +218,7 @@ impl ScreenBuffers {
 
     /// Number of workgroups of `work` that [`WorkPass`] computed last.
     pub(crate) fn groups(&self, work: Work) -> Groups {
-        Groups::Counted(self.arguments.clone(), work as u64 * WORK_BYTES)
+        Groups::Counted(self.arguments.clone(), work as u64 * DISPATCH_BYTES)
     }
 }
 

@@ -8,7 +8,7 @@
 #import groups
 #import keys
 
-@group(0) @binding(1) var<storage, read_write> keys: array<vec2u>;
+@group(0) @binding(1) var<storage, read_write> keys: array<Key>;
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
 
 var<workgroup> owned: atomic<u32>;
@@ -24,8 +24,8 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     let pixel = OCCUPANCY_BLOCK_PX * block.yx + vec2u(local % OCCUPANCY_BLOCK_PX, local / OCCUPANCY_BLOCK_PX);
     if all(pixel < frame.size) {
         let slot = (pixel.y * frame.size.x + pixel.x) << frame.halves;
-        var own = u32(keys[slot].x != EMPTY_KEY);
-        if frame.halves == 1u && keys[slot + 1u].x != EMPTY_KEY {
+        var own = u32(keys[slot].point != NO_POINT);
+        if frame.halves == 1u && keys[slot + 1u].point != NO_POINT {
             own += 1u;
             if own == 2u && erase_far(slot) {
                 own = 1u;
@@ -42,11 +42,11 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
 
 // Empties the slot of a pixel's farther point if it lies too far behind the nearer; returns whether it does.
 fn erase_far(slot: u32) -> bool {
-    let depth = vec2f(bitcast<f32>(keys[slot].y), bitcast<f32>(keys[slot + 1u].y));
+    let depth = vec2f(bitcast<f32>(keys[slot].depth), bitcast<f32>(keys[slot + 1u].depth));
     let near = min(depth.x, depth.y);
     if max(depth.x, depth.y) <= near + MAX_SECOND_DEPTH_PX * pixel_size(near) {
         return false;
     }
-    keys[slot + u32(depth.y > depth.x)] = vec2u(EMPTY_KEY);
+    keys[slot + u32(depth.y > depth.x)] = EMPTY_KEY;
     return true;
 }

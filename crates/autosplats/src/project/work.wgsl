@@ -6,7 +6,7 @@
 #import put_work
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
-@group(0) @binding(2) var<storage, read_write> arguments: array<u32>;
+@group(0) @binding(2) var<storage, read_write> arguments: array<Dispatch>;
 
 // Items that a workgroup processes together.
 override ITEMS_PER_GROUP: u32;

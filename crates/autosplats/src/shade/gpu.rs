@@ -6,6 +6,8 @@ mod uniform;
 
 pub(crate) use finish::{ReadPicture, finish};
 pub(crate) use texture::check_texture;
+#[cfg(test)]
+pub(crate) use uniform::ShadePair;
 pub(crate) use uniform::{ShadeUniform, ShownQuantity, finds_range};
 
 use super::color_map::{self, table};

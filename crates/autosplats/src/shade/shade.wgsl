@@ -103,12 +103,12 @@ fn rise(depth: f32, there: f32, scale: f32) -> f32 {
 // Share of the light that a pair of pixels takes away.
 fn pair_occlusion(index: u32, pixel: vec2i, depth: f32, pixels_per_unit: f32) -> f32 {
     let pair = shading.pairs[index];
-    let step = vec2i(pair.xy);
-    let scale = pixels_per_unit * pair.z;
+    let step = vec2i(pair.step);
+    let scale = pixels_per_unit * pair.inverse_px;
     let a = rise(depth, depth_at(pixel + step), scale);
     let b = rise(depth, depth_at(pixel - step), scale);
     let cosine = (1.0 - a * b) * inverseSqrt((1.0 + a * a) * (1.0 + b * b));
-    return select(0.0, (1.0 - cosine) * 0.5 * pair.w, a + b > 0.0);
+    return select(0.0, (1.0 - cosine) * 0.5 * pair.part, a + b > 0.0);
 }
 
 // Light left by occlusion, 0 to 1.

@@ -52,7 +52,6 @@ struct Frame {
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
-const NO_POINT = 0xffffffffu;
 
 fn infinity() -> f32 {
     // A variable, because constant expressions must be finite.

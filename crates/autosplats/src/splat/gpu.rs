@@ -16,7 +16,7 @@ use super::trim::blurred::{self, BLOCK_PX};
 use super::trim::{self, ACROSS, LINES, OWN_SIXTEENTHS};
 use super::{centers, raster, setup};
 use crate::Error;
-use crate::adapt::gpu::NOISE_FLOATS;
+use crate::adapt::FrameStatistics;
 use crate::fit::{SUPPORT, Surfel};
 use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
 use crate::project::MARGIN_REACH;
@@ -112,7 +112,7 @@ pub(crate) struct LayerRules<'a> {
     pub(crate) depth_refinement: bool,
     /// Trim the layers in the end.
     pub(crate) trim: bool,
-    /// Noise of the frame in the layout of `shared/noise.wgsl`; `None` if it is not measured.
+    /// [`FrameStatistics`] with the noise; `None` if it is not measured.
     pub(crate) noise: Option<&'a wgpu::Buffer>,
 }
 
@@ -153,7 +153,7 @@ impl SplatBuffers {
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
             centers: gpu.storage::<u32>("centres of splats", pixels)?,
             blocks: gpu.storage::<u32>("blocks of pixels", block_count(size) as usize)?,
-            no_noise: gpu.storage::<f32>("no noise", NOISE_FLOATS)?,
+            no_noise: gpu.storage::<FrameStatistics>("no noise", 1)?,
         })
     }
 }

@@ -1,6 +1,6 @@
 // Trim: removes the tails that splats leave around a silhouette. The CPU form is `trim.rs`.
 //
-// Reads: centers, sixteenths, measured, blocks. Reads and writes: surface, cover, extras. Writes: counters. Of other
+// Reads: centers, sixteenths, statistics, blocks. Reads and writes: surface, cover, extras. Writes: counters. Of other
 // pixels it reads only the rims, which no invocation writes.
 
 #import frame
@@ -8,6 +8,7 @@
 #import blurred
 #import groups
 #import layers
+#import noise
 #import picture
 
 @group(0) @binding(1) var<storage, read_write> surface: array<vec4f>;
@@ -16,7 +17,7 @@
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read> centers: array<u32>;
 @group(0) @binding(6) var<storage, read> sixteenths: array<u32>;
-@group(0) @binding(7) var<storage, read> measured: array<f32>;
+@group(0) @binding(7) var<storage, read> statistics: FrameStatistics;
 @group(0) @binding(8) var<storage, read> blocks: array<u32>;
 
 // 1 to trim, 0 only to count covered pixels.
@@ -74,7 +75,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
             atomicOr(&empties[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
         }
     }
-    if measured[0] > 0.0 {
+    if statistics.noise.level > 0.0 {
         for (var place = local; place < WIDE_BLOCKS * WIDE_BLOCKS; place += GROUP) {
             let at = vec2u(place % WIDE_BLOCKS, place / WIDE_BLOCKS);
             // Unsigned wrap-around moves blocks before the first far beyond the last.
@@ -192,7 +193,7 @@ fn blurred_by(place: vec2u, pixel: vec2u, reach_px: f32) -> f32 {
     if atomicLoad(&is_any_empty) == 0u {
         return 0.0;
     }
-    let noise = noise_px(pixel, surface[pixel.y * frame.size.x + pixel.x], reach_px);
+    let noise = noise_px(statistics.noise, pixel, surface[pixel.y * frame.size.x + pixel.x], reach_px);
     if !(noise >= MIN_BLURRING_NOISE_PX) {
         return 0.0;
     }
@@ -217,7 +218,7 @@ fn sticks_out(place: vec2u, pixel: vec2u, own: f32) -> bool {
     var answer = SILENT;
     let noise = blurred_by(place, pixel, abs(own));
     if noise > 0.0 {
-        answer = is_beside_blurred(pixel, abs(own), noise);
+        answer = is_beside_blurred(pixel, abs(own), noise, statistics.noise.sure);
     }
     if answer == SILENT && is_gap(place) {
         answer = is_beside(pixel, abs(own) > MAX_NARROW_REACH_PX, is_border(place));

@@ -1,7 +1,7 @@
 //! The stage on the GPU against the CPU, with the same surfels.
 
 use super::super::cells::{CellRow, Cells, Cluster, Level};
-use super::super::noise::{FrameStatistics, Noise};
+use super::super::noise::Noise;
 use super::super::tests::{Case, K, PROJECTIONS, angle};
 use super::*;
 use crate::fit::gpu::surfel_buffer;
@@ -42,15 +42,9 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> DeviceResults {
     }
     steps.iter().for_each(|step| recorder.run(step));
     recorder.finish();
-    let [level, power, k_radius, sheet_level, most, sure] =
-        read_back::<[f32; NOISE_FLOATS]>(gpu, &buffers.measured, 1).expect("noise")[0];
     DeviceResults {
         cells: read_cells(gpu, &buffers, screen.size),
-        usual: FrameStatistics {
-            noise: Noise { level, power, most, sure },
-            k_radius,
-            sheet_level: sheet_level as usize,
-        },
+        usual: read_back(gpu, &buffers.statistics, 1).expect("statistics")[0],
         surfels: read_back(gpu, &surfels, fitted.len()).expect("surfels"),
     }
 }

@@ -1,12 +1,7 @@
-// Decides which surfels have to be fitted anew because of noise. The including pass binds `measured`.
+// Decides which surfels have to be fitted anew because of noise.
 
 #import frame
 #import surfel
-
-// Level of the cells that have sheets.
-fn sheet_level() -> u32 {
-    return u32(measured[3]);
-}
 
 // Standard error of a normal, in radians, that needs no larger ball.
 fn good_enough(noise: f32, k_radius: f32, depth: f32) -> f32 {

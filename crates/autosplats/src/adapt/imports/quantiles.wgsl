@@ -6,6 +6,12 @@ const SPARSEST = 1u;
 const ALL = 2u;
 const STEADY_ALL = 3u;
 
+struct Quantile {
+    kind: u32,
+    // A scatter, world units, or a share.
+    value: f32,
+}
+
 // Kinds: too few balls for a result; a quantile of all balls; a quantile of the balls in which the surface is thin.
 const TOO_FEW_BALLS = 0u;
 const OF_ALL_BALLS = 1u;

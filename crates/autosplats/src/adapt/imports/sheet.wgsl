@@ -7,6 +7,15 @@
 const UNKNOWN = 0.0;
 const NONE = -1.0;
 
+// Surfels that ask for the sheets of a cell.
+struct Asked {
+    count: u32,
+    // Sum of their k-radii, in `K_RADIUS_PARTS_PER_PX` of a pixel.
+    k_radii: u32,
+    // Smallest point index.
+    point: u32,
+}
+
 // An upright quadric and the extent of the balls that it was fitted to.
 struct Sheet {
     center: vec3f,

@@ -1,5 +1,4 @@
-// Shrinks surfels that lie on no surface: see the CPU form. The including pass binds `measured`. See
-// docs/decisions/0010-outliers.md.
+// Shrinks surfels that lie on no surface: see the CPU form. See docs/decisions/0010-outliers.md.
 
 #import frame
 #import quadric
@@ -12,9 +11,9 @@ fn dot_radius(surfel: Surfel) -> f32 {
 }
 
 // Radius of a surfel after the outlier test; 0 if the surfel is dropped. Outliers have neighbours that are far away and
-// fill space, or that are cut off from all other points. `initial_radius` is the first search radius.
-fn shrunk(surfel: Surfel, initial_radius: f32) -> f32 {
-    let usual = measured[2];
+// fill space, or that are cut off from all other points. `initial_radius` is the
+// first search radius, `usual` the median k-radius of all surfels.
+fn shrunk(surfel: Surfel, initial_radius: f32, usual: f32) -> f32 {
     // Too few points have no usual k-radius.
     if usual == 0.0 {
         return surfel.radius;

@@ -1,4 +1,11 @@
-// Keys of the nearest point per slot, which is a pixel or half of one. x is the index in the cloud, y the bits of the
-// depth. Positive floats have the order of their bits, so the pair as a 64-bit number orders by depth, then by index.
+// Keys of the nearest point per slot, which is a pixel or half of one. Positive floats have the order of their bits, so
+// a key as a 64-bit number orders by depth, then by index.
 
-const EMPTY_KEY = 0xffffffffu;
+struct Key {
+    // Index in the cloud; `NO_POINT` in an empty slot.
+    point: u32,
+    // Bits of the depth.
+    depth: u32,
+}
+
+const EMPTY_KEY = Key(NO_POINT, 0xffffffffu);

@@ -1,7 +1,7 @@
 //! The kd-tree on the GPU: passes that build the tree level by level, then search it.
 
 use crate::Error;
-use crate::gpu::{Gpu, Groups, Library, Pass, Step, constants, files, indices, passes};
+use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, Step, constants, files, indices, passes};
 use crate::project::Chunk;
 use crate::project::gpu::{Counter, Round};
 use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers};
@@ -61,9 +61,6 @@ indices! {
     }
 }
 
-/// Bytes of the arguments of an indirect dispatch.
-const WORK_BYTES: u64 = 12;
-
 /// Number of levels of large nodes to record: 5/2 per halving of the points, and some for inexact sampled medians. A
 /// split that leaves three quarters on one side is not yet lopsided and takes 1/log₂(4/3) = 2.41 levels per halving. A
 /// lopsided split and the median after it take two. The number is even, so that all points end in the first list.
@@ -101,7 +98,7 @@ impl TreeBuffers {
         let points = |_| gpu.storage::<Point>("points of the kd-tree", capacity);
         let arguments = |_| {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
-            gpu.buffer("arguments of the kd-tree", Work::CONSTANTS.len() as u64 * WORK_BYTES, usage)
+            gpu.buffer("arguments of the kd-tree", Work::CONSTANTS.len() as u64 * DISPATCH_BYTES, usage)
         };
         Ok(Self {
             capacity: capacity as u32,
@@ -118,7 +115,7 @@ impl TreeBuffers {
 
     /// Number of workgroups of `work` at a level of this parity.
     fn groups(&self, parity: usize, work: Work) -> Groups {
-        Groups::Counted(self.arguments[parity].clone(), work as u64 * WORK_BYTES)
+        Groups::Counted(self.arguments[parity].clone(), work as u64 * DISPATCH_BYTES)
     }
 }
 

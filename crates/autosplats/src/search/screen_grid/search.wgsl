@@ -20,7 +20,7 @@
 #import window_points
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(4) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
@@ -272,7 +272,7 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         let query = queries[task.first + index];
         let point = points[query];
         let cell = density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns);
-        let initial_radius = first_radius(density[cell].x, task.cell_px, point.position_view.z);
+        let initial_radius = initial_radius_of(density[cell].count, task.cell_px, point.position_view.z);
         let found = find(query, point.position_view, initial_radius);
         neighborhoods[task.first + index] = moments(point.position_view, found.squared);
         if found.is_clamped {

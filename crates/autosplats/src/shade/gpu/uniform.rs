@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use super::super::cpu::{ENCODE_STEPS, Scene, darkening, given_light, sample_step, shows_colors};
 use super::super::edges::{EDGE_SEARCH_PX, Edges, MIN_TILT_LOSS};
 use super::super::light::{CLAY, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY};
-use super::super::occlusion::{FARTHEST_RISE, MAX_FULL_RISE, MIN_RISE, PAIR_COUNT, pairs};
+use super::super::occlusion::{FARTHEST_RISE, MAX_FULL_RISE, MIN_RISE, PAIR_COUNT, Pair, pairs};
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
 use crate::gpu::indices;
@@ -77,7 +77,16 @@ pub(crate) struct ShadeUniform {
     pub(crate) measures: u32,
     pub(crate) edge_search: i32,
     pub(crate) less_tilted: f32,
-    pub(crate) pairs: [[f32; 4]; PAIR_COUNT],
+    pub(crate) pairs: [ShadePair; PAIR_COUNT],
+}
+
+/// A [`Pair`] of pixels, laid out as in `imports/shading.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ShadePair {
+    pub(crate) step: [f32; 2],
+    pub(crate) inverse_px: f32,
+    pub(crate) part: f32,
 }
 
 /// Whether the range has to be found from the values.
@@ -124,9 +133,9 @@ impl ShadeUniform {
             measures: if layers.channels.color { layers.size.iter().product() } else { 0 },
             edge_search: EDGE_SEARCH_PX as i32,
             less_tilted: MIN_TILT_LOSS,
-            pairs: pairs(height).map(|pair| {
-                let [dx, dy] = pair.step.map(|side| side as f32);
-                [dx, dy, pair.inverse_px, pair.part]
+            pairs: pairs(height).map(|Pair { step, inverse_px, part }| {
+                let step = step.map(|side| side as f32);
+                ShadePair { step, inverse_px, part }
             }),
         }
     }

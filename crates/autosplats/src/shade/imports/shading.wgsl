@@ -54,9 +54,18 @@ struct ShadeUniform {
     edge_search: i32,
     // Difference of tilt towards a border from which a pixel uses the normal further in instead of its own.
     less_tilted: f32,
-    // Pairs of pixels for occlusion: step to the second pixel, inverse length of the step in pixels, and weight of the
-    // pair.
-    pairs: array<vec4f, PAIR_COUNT>,
+    // Pairs of pixels for occlusion.
+    pairs: array<ShadePair, PAIR_COUNT>,
+}
+
+// Pixels on either side of a pixel.
+struct ShadePair {
+    // Step to the second pixel.
+    step: vec2f,
+    // Inverse length of the step in pixels.
+    inverse_px: f32,
+    // Weight of the pair.
+    part: f32,
 }
 
 @group(0) @binding(1) var<uniform> shading: ShadeUniform;

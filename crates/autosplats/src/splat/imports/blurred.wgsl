@@ -1,5 +1,5 @@
-// Borders that are blurred by noise: see the CPU form, `trim/blurred.rs`. The including pass binds `measured`, `blocks`
-// and `cover`, and defines `SPLAT_WINDOW_PX`, `of_pixel_at`, `SILENT`, `YES` and `NO`. "Marked" sixteenths of pixels
+// Borders that are blurred by noise: see the CPU form, `trim/blurred.rs`. The including pass binds `blocks` and
+// `cover`, and defines `SPLAT_WINDOW_PX`, `of_pixel_at`, `SILENT`, `YES` and `NO`. "Marked" sixteenths of pixels
 // hold points. See docs/decisions/0003-borders-of-noise.md.
 
 #import frame
@@ -9,14 +9,14 @@
 #import picture
 
 // Noise in pixels at a pixel with this normal and depth, covered by a splat of this reach.
-fn noise_px(pixel: vec2u, shown: vec4f, reach_px: f32) -> f32 {
+fn noise_px(noise: Noise, pixel: vec2u, shown: vec4f, reach_px: f32) -> f32 {
     let eye = to_eye(unproject(vec2f(pixel) + 0.5, shown.w));
     let facing = dot(shown.xyz, eye) / length(eye);
     let aside = min(sqrt(max(1.0 - facing * facing, 0.0)) / FULL_NOISE_SINE, 1.0);
     let size = pixel_size(shown.w);
     // Inverse of the splat radius's formula.
     let k_radius = reach_px / SUPPORT * size * (0.5 * sqrt(f32(frame.k)) / frame.splat_scale);
-    return BLURRING_NOISE_SHARE * aside * noise_at(k_radius) / size;
+    return BLURRING_NOISE_SHARE * aside * noise_at(noise, k_radius) / size;
 }
 
 // Width of a fringe in pixels.
@@ -24,9 +24,9 @@ fn fringe_px(reach_px: f32, noise: f32) -> f32 {
     return min(reach_px + FRINGE_NOISES * noise, f32(BLOCK_PX * FRINGE_BLOCKS));
 }
 
-// Whether a pixel lies beside a surface whose border is blurred by `noise` pixels; `SILENT` if the points do not
-// suffice.
-fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
+// Whether a pixel lies beside a surface whose border is blurred by `noise` pixels, with the certainty `sure`; `SILENT`
+// if the points do not suffice.
+fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32, sure: f32) -> u32 {
     // Points beyond the screen are unknown.
     let to_edge = min(pixel, frame.size - 1u - pixel);
     let widest = min(MAX_WINDOW_PX, f32(min(to_edge.x, to_edge.y)));
@@ -41,7 +41,7 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     }
     let blur = vec2f(window * window / WINDOW_PER_KERNEL_VARIANCE, noise * noise);
     let apart = window * sqrt(3.14159265 / here.count);
-    let sure_px = SURE_NOISE_PX + noise_sure() * (min(SURE_NOISE_DISTANCES * apart, SURE_NOISE_PX) - SURE_NOISE_PX);
+    let sure_px = SURE_NOISE_PX + sure * (min(SURE_NOISE_DISTANCES * apart, SURE_NOISE_PX) - SURE_NOISE_PX);
     let may_be = MAX_BLURRED_OFFSET[1] + (MAX_BLURRED_OFFSET[0] - MAX_BLURRED_OFFSET[1]) * max(1.0 - noise / sure_px, 0.0);
     // The length of the offset bounds its part in any direction.
     if length(here.offset) / blur_unit(blur) <= may_be {

@@ -5,13 +5,15 @@ use std::mem::offset_of;
 use wgpu::naga::{self, Module, TypeInner};
 
 use super::passes;
-use crate::adapt::DepthRun;
+use crate::adapt::gpu::Asked;
+use crate::adapt::{DepthRun, FrameStatistics, Noise};
 use crate::fit::Surfel;
 use crate::fit::orient::Sensor;
 use crate::gpu::{FrameUniform, PassSource};
+use crate::project::gpu::DensityCell;
 use crate::project::{ChunkUniform, ScreenPoint};
 use crate::search::splat_communication::gpu::Arguments;
-use crate::shade::gpu::ShadeUniform;
+use crate::shade::gpu::{ShadePair, ShadeUniform};
 use crate::splat::Cover;
 use crate::splat::over_time::Fitted;
 
@@ -42,7 +44,7 @@ macro_rules! mirrored {
     }};
 }
 
-fn mirrored() -> [Mirrored; 10] {
+fn mirrored() -> [Mirrored; 16] {
     [
         mirrored!(
             "Frame",
@@ -82,6 +84,12 @@ fn mirrored() -> [Mirrored; 10] {
         mirrored!("Cover", Cover { weight, rim, point, scalar }),
         mirrored!("Sensor", Sensor { position, first }),
         mirrored!("DepthRun", DepthRun { position, first, axis, factor, power, padding }),
+        mirrored!("Noise", Noise { level, power, most, sure }),
+        mirrored!("FrameStatistics", FrameStatistics { noise, k_radius, sheet_level }),
+        mirrored!("Asked", Asked { count, k_radii, point }),
+        mirrored!("DensityCell", DensityCell { count, nearest }),
+        mirrored!("CountedCell", DensityCell { count, nearest }),
+        mirrored!("ShadePair", ShadePair { step, inverse_px, part }),
         mirrored!("ScreenPoint", ScreenPoint { position_view, pixel }),
         mirrored!(
             "Surfel",

@@ -14,7 +14,7 @@
 @group(0) @binding(4) var<storage, read_write> radii: array<f32>;
 @group(0) @binding(5) var<storage, read_write> large: array<KdLarge>;
 @group(0) @binding(6) var<storage, read_write> state: KdState;
-@group(0) @binding(7) var<storage, read_write> arguments: array<u32>;
+@group(0) @binding(7) var<storage, read_write> arguments: array<Dispatch>;
 
 @compute @workgroup_size(256)
 fn begin(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {

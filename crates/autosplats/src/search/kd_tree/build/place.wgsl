@@ -15,7 +15,7 @@
 @group(0) @binding(4) var<storage, read_write> next_large: array<KdLarge>;
 @group(0) @binding(5) var<storage, read_write> small: array<KdSmall>;
 @group(0) @binding(6) var<storage, read_write> nodes: array<KdNode>;
-@group(0) @binding(7) var<storage, read_write> arguments: array<u32>;
+@group(0) @binding(7) var<storage, read_write> arguments: array<Dispatch>;
 
 // Sums over runs of nodes: nodes split, large children, their chunks, small children.
 var<workgroup> made: array<vec4u, 257>;
