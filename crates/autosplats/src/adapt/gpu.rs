@@ -109,6 +109,11 @@ type Cluster = [f32; 4];
 /// `Sheet` of `imports/sheet.wgsl`, padded.
 type Sheet = [f32; 16];
 
+/// Structs of WGSL with their sizes here.
+#[cfg(test)]
+pub(crate) const SIZES: &[(&str, usize)] =
+    &[("Level", size_of::<Level>()), ("Quantile", size_of::<Quantile>()), ("Sheet", size_of::<Sheet>())];
+
 /// Surfels that ask for the sheets of a cell, laid out as in `imports/sheet.wgsl`.
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]

@@ -105,6 +105,10 @@ const TOP_NODES: u32 = 1 + FAN + FAN * FAN + FAN * FAN * FAN;
 /// Bytes of a splat.
 const SPLAT_BYTES: usize = 48;
 
+/// Structs of WGSL with their sizes here.
+#[cfg(test)]
+pub(crate) const SIZES: &[(&str, usize)] = &[("Splat", SPLAT_BYTES)];
+
 /// Options of drawing the layers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LayerRules<'a> {

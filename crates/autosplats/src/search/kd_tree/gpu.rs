@@ -51,6 +51,15 @@ type Small = [u32; 4];
 /// `KdState` of `imports/kd_build.wgsl`.
 type State = [u32; 6];
 
+/// Structs of WGSL with their sizes here.
+#[cfg(test)]
+pub(crate) const SIZES: &[(&str, usize)] = &[
+    ("KdNode", size_of::<Node>()),
+    ("KdLarge", size_of::<Large>()),
+    ("KdSmall", size_of::<Small>()),
+    ("KdState", size_of::<State>()),
+];
+
 indices! {
     /// Indirect dispatches of the engine.
     enum Work in "Work" {

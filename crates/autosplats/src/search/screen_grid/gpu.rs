@@ -30,6 +30,10 @@ const MIN_K_FOUR_AT_A_TIME: u32 = 11;
 /// `Neighborhood` of `shared/neighborhood.wgsl`.
 type Neighborhood = [f32; 12];
 
+/// Structs of WGSL with their sizes here.
+#[cfg(test)]
+pub(crate) const SIZES: &[(&str, usize)] = &[("Neighborhood", size_of::<Neighborhood>())];
+
 /// Allocates the neighbourhoods of `capacity` queries.
 ///
 /// # Errors

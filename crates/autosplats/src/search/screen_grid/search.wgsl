@@ -31,7 +31,7 @@
 // Whether to search only the queries in `left`, whose searches `search_four` did not finish.
 override LEFT_ONLY: bool;
 
-// Rounds of loops (`rounds` in shared/window_points.wgsl) after which a query counts as bounded. The limit is far below
+// Rounds of loops (`rounds` of `window_points`) after which a query counts as bounded. The limit is far below
 // a software device's: such a device runs several invocations together, each loop as long as the longest of them.
 const MAX_LOOP_ROUNDS = 25000u;
 
@@ -134,7 +134,7 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> Win
     return seen;
 }
 
-// Searches the neighbourhood of one query. `task`, the counts of the frame, is defined in shared/search_task.wgsl.
+// Searches the neighbourhood of one query. `task`, the counts of the frame, is defined in `search_task`.
 fn find(query: u32, center: vec3f, initial_radius: f32) -> SearchResult {
     let strip_px = f32(task.strip_px);
     let outlier_radius = frame.outlier_growth * initial_radius;

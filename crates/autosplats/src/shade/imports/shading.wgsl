@@ -4,36 +4,17 @@
 #import frame
 
 struct ShadeUniform {
-    // Directions to the lights in view space (`key`, `fill`), and their linear colours.
-    key: vec3f,
-    // Amount by which the key light reaches surfaces turned away from it.
-    key_wrap: f32,
-    key_light: vec3f,
-    // Brightness above which lit colours are compressed.
-    shoulder: f32,
-    fill: vec3f,
-    // Strength of the darkening by occlusion.
-    darkening: f32,
-    fill_light: vec3f,
-    // Steepest rise beside a pixel that occludes in full, and the rise that far things count as.
-    steepest: f32,
-    // Light of ground and sky, on surfaces that face down and up.
-    ground: vec3f,
-    furthest: f32,
-    sky: vec3f,
-    // Least divisor for a rise.
-    least_rise: f32,
-    // Linear colour of a surface without colours.
-    clay: vec3f,
-    // A depth larger than a pixel's depth times this factor plus the offset belongs to another surface.
-    edge_factor: f32,
     // Direction of rising height, world space.
     up: vec3f,
-    edge_offset: f32,
-    // Light independent of the normal, and the share of the lights above.
+    // Strength of the darkening by occlusion.
+    darkening: f32,
+    // Light independent of the normal, and the share of the lights.
     given_light: vec2f,
     // Ends of the colour map, unless `find_range` is set.
     range: vec2f,
+    // A depth larger than a pixel's depth times this factor plus the offset belongs to another surface.
+    edge_factor: f32,
+    edge_offset: f32,
     find_range: u32,
     lighting: u32,
     keep_linear: u32,
@@ -44,16 +25,11 @@ struct ShadeUniform {
     // Sampling of pixels to find the range: step, and number of samples.
     sample_step: u32,
     samples: u32,
-    // Number of steps of the table from linear to sRGB.
-    encode_steps: u32,
     // Start of the rows' backgrounds in the tables.
     backgrounds: u32,
     // Start of the measures in `extras`.
     measures: u32,
-    // Distance in pixels within which the ends of a row of edges are searched.
-    edge_search: i32,
-    // Difference of tilt towards a border from which a pixel uses the normal further in instead of its own.
-    less_tilted: f32,
+    padding: u32,
     // Pairs of pixels for occlusion.
     pairs: array<ShadePair, PAIR_COUNT>,
 }
