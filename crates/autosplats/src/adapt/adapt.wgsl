@@ -1,38 +1,34 @@
 // Moves each noisy surfel onto the sheets beside it, and shrinks surfels that are no surface: an invocation per surfel.
 // Scan lines are left to `turn_rows`. See the CPU form.
 //
-// Reads: density, levels, clusters, measured, sheets, depth_noise. Reads and writes: counters, surfels.
+// Reads: density, levels, clusters, statistics, sheets, depth_noise. Reads and writes: counters, surfels.
 
 #import frame
-#import groups
-#import counters
+#import alone
 #import base_radius
 #import calls
 #import choose
+#import density
 #import depth_noise
+#import groups
+#import levels
 #import moved
+#import noise
+#import orthonormal
+#import round
+#import screen
 #import sheet
-#import alone
 #import shrink
+#import surfel
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> levels: array<Level>;
 @group(0) @binding(4) var<storage, read> clusters: array<vec4f>;
-@group(0) @binding(5) var<storage, read> measured: array<f32>;
+@group(0) @binding(5) var<storage, read> statistics: FrameStatistics;
 @group(0) @binding(6) var<storage, read> sheets: array<Sheet>;
 @group(0) @binding(7) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(8) var<storage, read_write> surfels: array<Surfel>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
-override MAX_NOISE_K_RADII: f32;
-override MAX_K_RADIUS_FIRST_RADII: f32;
-override OUTLIER_OFFSET_NOISES: f32;
-override OUTLIER_OFFSET_KNOWN_NOISES: f32;
-override GRAZING_COSINE: f32;
-override FARTHEST_ALONG: f32;
-override LONGEST_SHADOW: f32;
 
 // The surface beside a surfel.
 struct Surface {
@@ -49,7 +45,7 @@ struct Surface {
 // below 0 if unreliable. Sheets have to agree with a reliable one.
 fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
     var sum = Surface();
-    let level = levels[sheet_level()];
+    let level = levels[statistics.sheet_level];
     if level.side_px == 0u {
         return sum;
     }
@@ -167,15 +163,15 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     let place = first_of_round + index;
     var surfel = surfels[place];
-    let known = known_beyond(noise_at(surfel.k_radius), surfel.center, surfel.source);
+    let known = known_beyond(noise_at(statistics.noise, surfel.k_radius), surfel.center, surfel.source);
     if is_row(surfel, known.noise) {
         return;
     }
-    let noise = max(known.noise, noise_at(surfel.k_radius));
+    let noise = max(known.noise, noise_at(statistics.noise, surfel.k_radius));
     let cell_px = atomicLoad(&counters[CELL_PX]);
-    let cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
     // Read before the surfel moves, possibly to an empty place.
-    let own_radius = initial_radius(surfel, cell_px, cell_columns);
+    let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, atomicLoad(&counters[CELL_COLUMNS]))];
+    let own_radius = initial_radius_of(cell.count, cell_px, surfel.center.z);
     // A line has no width to draw.
     surfel.major_ratio = select(min(surfel.major_ratio, frame.longest), 1.0, is_line(surfel));
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
@@ -187,7 +183,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         let scatter = most_scatter(noise, known.noise > 0.0);
         surface = blend(surfel.center, first, noise, scatter);
         if surface.weight == 0.0 {
-            let radius = base_radius(surfel, cell_px, cell_columns);
+            let radius = base_radius(surfel, own_radius);
             let quadric = choose(surfel.center, radius, first, noise, enough, scatter);
             if quadric.len > 0u {
                 surface = Surface(quadric.axis * quadric.height, 1.0, quadric.normal, quadric.curvature);
@@ -201,7 +197,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         }
         surfel = moved_onto(surfel, surface, noise, known);
     } else if !is_dropped(surfel) {
-        surfel.radius = shrunk(surfel, own_radius);
+        surfel.radius = shrunk(surfel, own_radius, statistics.k_radius);
         if is_dropped(surfel) {
             atomicAdd(&counters[OUTLIERS], 1u);
         }

@@ -4,21 +4,16 @@
 // Reads: counters. Writes: levels, arguments, picked. One invocation.
 
 #import frame
-#import groups
-#import put_work
-#import counters
 #import levels
+#import put_work
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> levels: array<Level>;
-@group(0) @binding(3) var<storage, read_write> arguments: array<u32>;
+@group(0) @binding(3) var<storage, read_write> arguments: array<Dispatch>;
 @group(0) @binding(4) var<storage, read_write> picked: array<u32>;
 
-override MOST_LEVELS: u32;
 override MOST_FINEST: u32;
-override MOST_SAMPLED: u32;
-// The finest level whose cells may have sheets, and the number of cells per workgroup that fits them.
-override FINE_SHEETS: u32;
+// Cells of a workgroup that fits sheets.
 override ITEMS_PER_GROUP: u32;
 
 // Columns and rows of cells in a picture.
@@ -49,8 +44,9 @@ fn arrange() {
         level.side_px = select(0u, level.side_px, index <= doublings);
         levels[index] = level;
         put_work(index, cells, 64u);
-        if index == FINE_SHEETS {
-            put_work(MOST_LEVELS, cells, ITEMS_PER_GROUP);
+        // The finest level that may have sheets has the most cells.
+        if index == SHEET_LEVELS[0] {
+            put_work(WORK_SHEETS, cells, ITEMS_PER_GROUP);
         }
         level.side_px *= 2u;
         level.columns = (level.columns + 1u) / 2u;

@@ -11,7 +11,7 @@ use crate::project::ScreenPoints;
 /// Most slabs of depth in a cell, each as thick as the cell is wide. A surface tilted by up to 82° fills no more. A
 /// fuller cell, such as one with noise seen from the side, has thicker slabs. These cut clusters along lines of sight
 /// that nearly lie in the surface, and fits lean. See docs/decisions/0008-eight-slabs.md.
-pub(crate) const SLABS: usize = 8;
+pub(super) const SLABS: usize = 8;
 /// Most finest cells. Pictures with as many cells of two pixels are larger than 3200×1800.
 pub(crate) const MOST_FINEST: usize = 1_500_000;
 /// Most levels of cells. No ball needs coarser ones.

@@ -73,7 +73,7 @@ impl Adapter {
     ) {
         let Self { cells, sheets, usual } = self;
         let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, rules.k));
-        sheets.level = usual.sheet_level;
+        sheets.level = usual.sheet_level as usize;
         let known = &known.seen_by(view);
         let task = Task { cells, density, view, rules, usual, known };
         // A noisy surfel asks for the sheets of the cells around it, which are then fitted.

@@ -3,11 +3,11 @@
 // Reads: counters, levels, cell_start, points. Writes: clusters.
 
 #import frame
-#import groups
-#import counters
-#import screen
-#import levels
+#import divide
 #import filling
+#import groups
+#import levels
+#import screen
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> levels: array<Level>;

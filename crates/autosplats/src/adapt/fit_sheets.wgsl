@@ -1,27 +1,27 @@
 // Fits sheets to the clusters of each cell that surfels ask for, largest first, until all clusters are covered or the
 // cell is full. A workgroup for a few cells fits those that are asked for one after the other. See the CPU form.
 //
-// Reads: levels, clusters, measured, asked, depth_noise. Reads and writes: sheets.
+// Reads: levels, clusters, statistics, asked, depth_noise. Reads and writes: sheets.
 
 #import frame
-#import groups
 #import calls
 #import choose
+#import clusters
 #import depth_noise
-#import together
-#import sheet
 #import divide
+#import groups
+#import levels
+#import noise
+#import sheet
+#import together
 
 @group(0) @binding(1) var<storage, read> levels: array<Level>;
 @group(0) @binding(2) var<storage, read> clusters: array<vec4f>;
-@group(0) @binding(3) var<storage, read> measured: array<f32>;
-@group(0) @binding(4) var<storage, read> asked: array<u32>;
+@group(0) @binding(3) var<storage, read> statistics: FrameStatistics;
+@group(0) @binding(4) var<storage, read> asked: array<Asked>;
 @group(0) @binding(5) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(6) var<storage, read_write> sheets: array<Sheet>;
 
-override K_RADIUS_PARTS_PER_PX: f32;
-override COVERED: f32;
-override COVERED_REACH: f32;
 // Cells of a workgroup.
 override ITEMS_PER_GROUP: u32;
 
@@ -38,12 +38,12 @@ fn asked_around(level: Level, cell: u32) -> SheetDemand {
     let low = max(at, vec2u(1u)) - 1u;
     let high = min(at + 1u, vec2u(level.columns, level.rows) - 1u);
     var sum = vec2u(0u);
-    var point = 0xffffffffu;
+    var point = NO_POINT;
     for (var y = low.y; y <= high.y; y++) {
         for (var x = low.x; x <= high.x; x++) {
-            let at = 3u * (y * level.columns + x);
-            sum += vec2u(asked[at], asked[at + 1u]);
-            point = min(point, asked[at + 2u]);
+            let there = asked[y * level.columns + x];
+            sum += vec2u(there.count, there.k_radii);
+            point = min(point, there.point);
         }
     }
     return SheetDemand(select(0.0, f32(sum.y) / (f32(sum.x) * K_RADIUS_PARTS_PER_PX), sum.x > 0u), point);
@@ -56,7 +56,7 @@ var<workgroup> shared_wanted: u32;
 @compute @workgroup_size(TOGETHER)
 fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     own_place = local;
-    let level = levels[sheet_level()];
+    let level = levels[statistics.sheet_level];
     let first = group_index(workgroup) * ITEMS_PER_GROUP;
     if local == 0u {
         atomicStore(&found_wanted, 0u);
@@ -97,7 +97,7 @@ fn fit_cell(level: Level, cell: u32) {
         left[largest] = 0.0;
         let center = clusters[cluster_at(first, largest)].xyz;
         let radius = around.k_radius_px * pixel_size(center.z);
-        let measured_noise = noise_at(radius);
+        let measured_noise = noise_at(statistics.noise, radius);
         let known = known_beyond(measured_noise, center, around.point).noise;
         let noise = max(measured_noise, known);
         let enough = good_enough(noise, radius, center.z);
@@ -123,7 +123,7 @@ fn fit_cell(level: Level, cell: u32) {
         for (var index = 0u; index < SLABS; index++) {
             if left[index] > 0.0 {
                 let over = under(sheet, clusters[cluster_at(first, index)].xyz);
-                let is_covered = abs(over.height) < COVERED * noise && over.near > 1.0 - COVERED_REACH;
+                let is_covered = abs(over.height) < COVERED_NOISES * noise && over.near > 1.0 - COVERED_REACH;
                 left[index] = select(left[index], 0.0, is_covered);
             }
         }

@@ -7,20 +7,15 @@
 #import sheet
 
 @group(0) @binding(0) var<storage, read> levels: array<Level>;
-@group(0) @binding(1) var<storage, read_write> asked: array<u32>;
+@group(0) @binding(1) var<storage, read_write> asked: array<Asked>;
 @group(0) @binding(2) var<storage, read_write> sheets: array<Sheet>;
-
-// The finest level whose cells may have sheets; it has the most cells.
-override FINE_SHEETS: u32;
 
 @compute @workgroup_size(64)
 fn forget(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let level = levels[FINE_SHEETS];
+    let level = levels[SHEET_LEVELS[0]];
     let cell = group_index(workgroup) * 64u + local;
     if cell < level.columns * level.rows {
-        asked[3u * cell] = 0u;
-        asked[3u * cell + 1u] = 0u;
-        asked[3u * cell + 2u] = 0xffffffffu;
+        asked[cell] = Asked(0u, 0u, NO_POINT);
         for (var index = 0u; index < SHEETS; index++) {
             sheets[cell * SHEETS + index].radius = UNKNOWN;
         }

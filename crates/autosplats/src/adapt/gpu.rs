@@ -1,73 +1,127 @@
 //! Adapt on the GPU: the steps of the CPU form, one pass each.
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
-use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING_COSINE, LONGEST_SHADOW};
-use super::noise::{
-    CERTAIN_NOISE_SHARES, FULL_K_RADIUS_CONTRAST, GROWTH_POWER_RAMP, LEAST_PAIRS, LEAST_SAMPLE, MAX_STEADY_RATIO,
-    MAX_THIN_SHARE_RISE, MIN_BALL_SHARE_DIVISOR, MIN_K_RADIUS_CONTRAST, MOST_SAMPLED, NOISE_QUANTILE,
-    NOISE_SAMPLE_COUNT, NOISE_SHARES, ROUNDING_SCATTER_RADII, STEADY_SCALES, STRUCTURE_GROWTH_POWER, THICK_NOISE,
-    THIN_SCATTER_RADII, THIN_SHARE, UNEVEN_NOISE_QUANTILE, UNEVEN_NOISE_SHARES,
-};
-use super::quadric::{
-    CELLS_PER_RADIUS, EVEN_WEIGHT, FULL_WEIGHT_SQUARED_RADII, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE,
-};
-use super::rows::{
-    AREA_HALF_THICKNESS_RADII, BALL_OVER_SIDE_WEIGHT, BEYOND, BEYOND_RADII, MAX_AREA_HEIGHT_RATIO,
-    MAX_POINT_HEIGHT_RADII, MAX_SCAN_LINE_TILT_SINE, MAX_SEEN_THROUGH_SHARE, MAX_SEMI_AXIS_RADII, MIN_AREA_RATIO,
-    MIN_SCAN_LINE_ANISOTROPY, MIN_SIDE_AREA_RATIO, SEMI_AXIS_LINE_DISTANCES, SIDE_SLACK_RADII, THIN_LINE_ASPECT,
-};
-use super::rules::{
-    AGREE_ERRORS, CROWD_WEIGHT_PER_NEIGHBOR, DOT_OUTLIER_SCORE, DOT_PX, DROPPED_OUTLIER_SCORE, GOOD_NORMAL_ERROR_RAD,
-    ISOLATED_SCORE, LEAST_TRACE, MAX_K_RADIUS_FIRST_RADII, MAX_MEAN_DISTANCE_K_RADII, MAX_MOVE_NOISES,
-    MAX_NOISE_BALL_RADII, MAX_NOISE_K_RADII, MAX_PLANE_DISTANCE_K_RADII, MAX_RELIABLE_ERROR_RAD,
-    MAX_SCATTER_KNOWN_NOISES, MAX_SCATTER_NOISES, MOST_TINY, OUTLIER_OFFSET_KNOWN_NOISES, OUTLIER_OFFSET_NOISES,
-    SPARSE_MEDIAN_K_RADII, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDER_BALL_K_RADII,
-};
-use super::sheets::{COVERED, COVERED_REACH, K_RADIUS_PARTS_PER_PX, MAX_SUMMED_K_RADIUS_PX, SHEET_LEVELS, SHEETS};
-use super::through::{
-    CELLS_TO_COUNT, LEAST_ON, MAX_SURFACE_MEAN_RADII, MAX_SURFACE_VARIATION, MIN_SURFACE_WIDTH_RATIO,
-    MIN_TESTED_FIRST_RADII, ON_DISC, ON_DISC_NOISE, SURFACE_BALL_K_RADII,
-};
-use super::{MIN_BASE_FIRST_RADII, SCALES, STEP, noise};
+use super::depth::{DepthNoise, DepthRun};
+use super::noise::{FrameStatistics, MOST_SAMPLED, STEADY_SCALES};
+use super::sheets::{SHEET_LEVELS, SHEETS};
+use super::{self as adapt, SCALES, cells, depth, noise, quadric, rows, rules, sheets, through};
 use crate::Error;
-use crate::fit::{LONGEST, SUPPORT, SWEEPS};
-use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
-use crate::project::gpu::{Round, ScreenBuffers, few};
+use crate::fit::{self, Surfel};
+use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, Step, constants, files, passes};
+use crate::project::gpu::{Counter, Round, ScreenBuffers, few};
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] =
-    &[ARRANGE, FILL, MERGE, FORGET, PICK, SAMPLE_PASS, SCATTERS, QUANTILES, NOISE, ASK, FIT_SHEETS, ADAPT, TURN_ROWS];
-const ARRANGE: PassSource = PassSource::new("adapt/arrange", include_str!("arrange.wgsl"));
-const FILL: PassSource = PassSource::new("adapt/fill", include_str!("fill.wgsl"));
-const MERGE: PassSource = PassSource::new("adapt/merge", include_str!("merge.wgsl"));
-const PICK: PassSource = PassSource::new("adapt/pick", include_str!("pick.wgsl"));
-const SAMPLE_PASS: PassSource = PassSource::new("adapt/sample", include_str!("sample.wgsl"));
-const SCATTERS: PassSource = PassSource::new("adapt/scatter", include_str!("scatter.wgsl"));
-const QUANTILES: PassSource = PassSource::new("adapt/quantile", include_str!("quantile.wgsl"));
-const NOISE: PassSource = PassSource::new("adapt/noise", include_str!("noise.wgsl"));
-const FORGET: PassSource = PassSource::new("adapt/forget", include_str!("forget.wgsl"));
-const ASK: PassSource = PassSource::new("adapt/ask", include_str!("ask.wgsl"));
-const FIT_SHEETS: PassSource = PassSource::new("adapt/fit_sheets", include_str!("fit_sheets.wgsl"));
-const ADAPT: PassSource = PassSource::new("adapt/adapt", include_str!("adapt.wgsl"));
-const TURN_ROWS: PassSource = PassSource::new("adapt/turn_rows", include_str!("turn_rows.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: &[files![
+        "alone",
+        "base_radius",
+        "calls",
+        "choose",
+        "clusters",
+        "depth_noise",
+        "filling",
+        "levels",
+        "quadric",
+        "quantiles",
+        "rows",
+        "scatters",
+        "sheet",
+        "shrink",
+        "through",
+        "together",
+    ]],
+    constants: &[
+        Counter::CONSTANTS,
+        constants!(in adapt: MIN_BASE_FIRST_RADII, SCALES, STEP),
+        constants!(in cells: MOST_LEVELS, SLABS),
+        constants!(in depth: FARTHEST_ALONG, GRAZING_COSINE, LONGEST_SHADOW),
+        constants!(in fit: LONGEST, SUPPORT, SWEEPS),
+        constants!(in Surfel: BACK, LINE),
+        constants!(in noise:
+            CERTAIN_NOISE_SHARES, FULL_K_RADIUS_CONTRAST, GROWTH_END_DIVISOR, GROWTH_POWER_RAMP, LEAST_PAIRS,
+            LEAST_SAMPLE, MAX_STEADY_RATIO, MAX_THIN_SHARE_RISE, MIN_BALL_SHARE_DIVISOR, MIN_K_RADIUS_CONTRAST,
+            MOST_SAMPLED, NOISE_QUANTILE, NOISE_SAMPLE_COUNT, NOISE_SHARES, ROUNDING_SCATTER_RADII, STEADY_SCALES,
+            STRUCTURE_GROWTH_POWER, THICK_NOISE, THIN_SCATTER_RADII, THIN_SHARE, UNEVEN_NOISE_QUANTILE,
+            UNEVEN_NOISE_SHARES
+        ),
+        constants!(in quadric:
+            CELLS_PER_RADIUS, EVEN_WEIGHT, FULL_WEIGHT_SQUARED_RADII, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE
+        ),
+        constants!(in rows:
+            AREA_HALF_THICKNESS_RADII, BALL_OVER_SIDE_WEIGHT, BEYOND_LINE_DISTANCES, BEYOND_RADII,
+            MAX_AREA_HEIGHT_RATIO, MAX_POINT_HEIGHT_RADII, MAX_SCAN_LINE_TILT_SINE, MAX_SEEN_THROUGH_SHARE,
+            MAX_SEMI_AXIS_RADII, MIN_AREA_RATIO, MIN_SCAN_LINE_ANISOTROPY, MIN_SIDE_AREA_RATIO,
+            SEMI_AXIS_LINE_DISTANCES, SIDE_SLACK_RADII, THIN_LINE_ASPECT
+        ),
+        constants!(in rules:
+            AGREE_ERRORS, CROWD_WEIGHT_PER_NEIGHBOR, DOT_OUTLIER_SCORE, DOT_PX, DROPPED_OUTLIER_SCORE,
+            GOOD_NORMAL_ERROR_RAD, ISOLATED_SCORE, LEAST_TRACE, MAX_K_RADIUS_FIRST_RADII, MAX_MEAN_DISTANCE_K_RADII,
+            MAX_MOVE_NOISES, MAX_NOISE_BALL_RADII, MAX_NOISE_K_RADII, MAX_PLANE_DISTANCE_K_RADII,
+            MAX_RELIABLE_ERROR_RAD, MAX_SCATTER_KNOWN_NOISES, MAX_SCATTER_NOISES, MOST_TINY,
+            OUTLIER_OFFSET_KNOWN_NOISES, OUTLIER_OFFSET_NOISES, SPARSE_MEDIAN_K_RADII, TINY_PX, TINY_REACH_PX,
+            TINY_SLOPE, WIDER_BALL_K_RADII
+        ),
+        constants!(in sheets:
+            COVERED_NOISES, COVERED_REACH, K_RADIUS_PARTS_PER_PX, MAX_SUMMED_K_RADIUS_PX, SHEETS, SHEET_LEVELS
+        ),
+        constants!(in through:
+            CELLS_TO_COUNT, LEAST_ON, MAX_SURFACE_MEAN_RADII, MAX_SURFACE_VARIATION, MIN_SURFACE_WIDTH_RATIO,
+            MIN_TESTED_FIRST_RADII, ON_DISC, ON_DISC_NOISE, SURFACE_BALL_K_RADII
+        ),
+        constants![BUNCH, SAMPLE_PARTS, WORK_SHEETS],
+    ],
+};
+
+passes! {
+    "adapt", LIBRARY;
+    ARRANGE = "arrange",
+    FILL = "fill",
+    MERGE = "merge",
+    FORGET = "forget",
+    PICK = "pick",
+    SAMPLE_PASS = "sample",
+    SCATTERS = "scatter",
+    QUANTILES = "quantile",
+    NOISE = "noise",
+    ASK = "ask",
+    FIT_SHEETS = "fit_sheets",
+    ADAPT = "adapt",
+    TURN_ROWS = "turn_rows",
+}
 
 /// Invocations in a workgroup.
 const GROUP: usize = 64;
 /// Invocations that sum up a ball together, on hardware and on a software device, which runs eight side by side.
 const TOGETHER: [u32; 2] = [32, 8];
-/// Quantiles of scatter, per scale: of the sample's densest third, its sparsest third, all, and all by steady shares.
-const QUANTILES_TAKEN: usize = 4 * SCALES;
-/// Numbers that `noise.wgsl` writes.
-pub(crate) const NOISE_FLOATS: usize = 6;
-/// Bytes of the arguments of a dispatch.
-const WORK_BYTES: u64 = 12;
+/// Clusters of a cell that are stored side by side.
+const BUNCH: usize = 4;
+/// Parts of the sample that have quantiles: its densest third, its sparsest third, all, and all by steady shares.
+const SAMPLE_PARTS: usize = 4;
+/// Index of the dispatch that fits sheets; those before it fill the levels.
+const WORK_SHEETS: usize = MOST_LEVELS;
 
-/// `Level` of `shared/levels.wgsl`: side, columns, rows and first cell.
+/// `Level` of `imports/levels.wgsl`: side, columns, rows and first cell.
 type Level = [u32; 4];
+/// Kind and value.
+type Quantile = [u32; 2];
 /// Mean and count.
 type Cluster = [f32; 4];
-/// `Sheet` of `shared/sheet.wgsl`, padded.
+/// `Sheet` of `imports/sheet.wgsl`, padded.
 type Sheet = [f32; 16];
+
+/// Structs of WGSL with their sizes here.
+#[cfg(test)]
+pub(crate) const SIZES: &[(&str, usize)] =
+    &[("Level", size_of::<Level>()), ("Quantile", size_of::<Quantile>()), ("Sheet", size_of::<Sheet>())];
+
+/// Surfels that ask for the sheets of a cell, laid out as in `imports/sheet.wgsl`.
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Asked {
+    pub(crate) count: u32,
+    pub(crate) k_radii: u32,
+    pub(crate) point: u32,
+}
 
 /// Buffers that the stage keeps on the device from pass to pass.
 #[derive(Debug)]
@@ -76,7 +130,7 @@ pub(crate) struct AdaptBuffers {
     /// Workgroups that fill each level, three `u32`, then those that fit sheets.
     arguments: wgpu::Buffer,
     clusters: wgpu::Buffer,
-    /// Per cell: number of surfels that ask for sheets, sum of their k-radii, smallest point index.
+    /// [`Asked`] per cell.
     asked: wgpu::Buffer,
     sheets: wgpu::Buffer,
     /// Indices of the sampled surfels, then their number. `picked` is unordered, `sampled` is sorted by k-radius.
@@ -85,8 +139,8 @@ pub(crate) struct AdaptBuffers {
     scatters: wgpu::Buffer,
     /// Quantiles, then the steady shares of the first scales.
     quantiles: wgpu::Buffer,
-    /// Noise level and power, median k-radius, level of cells with sheets, largest k-radius of growth, certainty.
-    measured: wgpu::Buffer,
+    /// [`FrameStatistics`].
+    statistics: wgpu::Buffer,
     /// Owned by [`DepthNoiseBuffer`].
     depth_noise: wgpu::Buffer,
 }
@@ -103,24 +157,24 @@ impl AdaptBuffers {
             levels: gpu.storage::<Level>("levels of cells", MOST_LEVELS)?,
             arguments: gpu.buffer(
                 "arguments of levels",
-                (MOST_LEVELS as u64 + 1) * WORK_BYTES,
+                (WORK_SHEETS as u64 + 1) * DISPATCH_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
             clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size, most_finest))?,
-            asked: gpu.storage::<[u32; 3]>("surfels that ask for sheets", sheet_cells)?,
+            asked: gpu.storage::<Asked>("surfels that ask for sheets", sheet_cells)?,
             sheets: gpu.storage::<[Sheet; SHEETS]>("sheets", sheet_cells)?,
             picked: gpu.storage::<u32>("picked surfels", MOST_SAMPLED + 1)?,
             sampled: gpu.storage::<u32>("sampled surfels", MOST_SAMPLED + 1)?,
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * MOST_SAMPLED)?,
-            quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN + STEADY_SCALES)?,
-            measured: gpu.storage::<f32>("noise", NOISE_FLOATS)?,
+            quantiles: gpu.storage::<Quantile>("quantiles of scatter", SAMPLE_PARTS * SCALES + STEADY_SCALES)?,
+            statistics: gpu.storage::<FrameStatistics>("statistics of surfels", 1)?,
             depth_noise: known.runs.clone(),
         })
     }
 
-    /// The measured noise, in the layout of `shared/noise.wgsl`.
+    /// [`FrameStatistics`], with the measured noise.
     pub(crate) fn noise(&self) -> &wgpu::Buffer {
-        &self.measured
+        &self.statistics
     }
 }
 
@@ -213,180 +267,28 @@ impl AdaptPasses {
     fn with_form(gpu: &Gpu, together: u32) -> Result<Self, Error> {
         let together = ("TOGETHER", together.into());
         let few = ("ITEMS_PER_GROUP", few(gpu).into());
-        let quadric = [
-            ("SWEEPS", SWEEPS as f64),
-            ("MOST_LEVELS", MOST_LEVELS as f64),
-            ("CELLS_PER_RADIUS", CELLS_PER_RADIUS.into()),
-            ("LEAST_CLUSTERS", LEAST_CLUSTERS as f64),
-            ("LEAST_OF_PLANE", LEAST_OF_PLANE as f64),
-            ("FULL_WEIGHT_SQUARED_RADII", FULL_WEIGHT_SQUARED_RADII.into()),
-            ("RIDGE", RIDGE.into()),
-            ("LEAST_PIVOT", LEAST_PIVOT.into()),
-            ("STEP", STEP.into()),
-        ];
-        let least_reach = ("MIN_BASE_FIRST_RADII", MIN_BASE_FIRST_RADII.into());
-        let calls = [
-            ("GOOD_NORMAL_ERROR_RAD", GOOD_NORMAL_ERROR_RAD.into()),
-            ("TINY_PX", TINY_PX.into()),
-            ("TINY_SLOPE", TINY_SLOPE.into()),
-            ("TINY_REACH_PX", TINY_REACH_PX.into()),
-            ("MOST_TINY", MOST_TINY.into()),
-            ("MIN_SCAN_LINE_ANISOTROPY", MIN_SCAN_LINE_ANISOTROPY.into()),
-            ("MAX_SCATTER_NOISES", MAX_SCATTER_NOISES.into()),
-            ("MAX_SCATTER_KNOWN_NOISES", MAX_SCATTER_KNOWN_NOISES.into()),
-        ];
-        let choose = [
-            ("MAX_RELIABLE_ERROR_RAD", MAX_RELIABLE_ERROR_RAD.into()),
-            ("LEAST_TRACE", LEAST_TRACE.into()),
-            ("MAX_NOISE_BALL_RADII", MAX_NOISE_BALL_RADII.into()),
-            ("AGREE_ERRORS", AGREE_ERRORS.into()),
-            ("MAX_MOVE_NOISES", MAX_MOVE_NOISES.into()),
-        ];
-        let rows = [
-            ("MIN_AREA_RATIO", MIN_AREA_RATIO.into()),
-            ("MIN_SIDE_AREA_RATIO", MIN_SIDE_AREA_RATIO.into()),
-            ("BEYOND", BEYOND.into()),
-            ("LEAST_BEYOND", BEYOND_RADII[0].into()),
-            ("MOST_BEYOND", BEYOND_RADII[1].into()),
-            ("SIDE_SLACK_RADII", SIDE_SLACK_RADII.into()),
-            ("BALL_OVER_SIDE_WEIGHT", BALL_OVER_SIDE_WEIGHT.into()),
-            ("MAX_AREA_HEIGHT_RATIO", MAX_AREA_HEIGHT_RATIO.into()),
-            ("MAX_SCAN_LINE_TILT_SINE", MAX_SCAN_LINE_TILT_SINE.into()),
-            ("AREA_HALF_THICKNESS_RADII", AREA_HALF_THICKNESS_RADII.into()),
-            ("MAX_SEEN_THROUGH_SHARE", MAX_SEEN_THROUGH_SHARE.into()),
-            ("MAX_POINT_HEIGHT_RADII", MAX_POINT_HEIGHT_RADII.into()),
-            ("EVEN_WEIGHT", EVEN_WEIGHT.into()),
-            ("SEMI_AXIS_LINE_DISTANCES", SEMI_AXIS_LINE_DISTANCES.into()),
-            ("MAX_SEMI_AXIS_RADII", MAX_SEMI_AXIS_RADII.into()),
-            ("THIN_LINE_ASPECT", THIN_LINE_ASPECT.into()),
-            ("LONGEST", LONGEST.into()),
-        ];
-        let parts = ("K_RADIUS_PARTS_PER_PX", K_RADIUS_PARTS_PER_PX.into());
-        let ask = |round: Round| {
-            let own =
-                [("ROUND", f64::from(round as u32)), parts, ("MAX_SUMMED_K_RADIUS_PX", MAX_SUMMED_K_RADIUS_PX.into())];
-            Pass::new(gpu, &ASK, &[&calls[..], &own].concat())
-        };
-        let most_sampled = ("MOST_SAMPLED", MOST_SAMPLED as f64);
-        let scales = ("SCALES", SCALES as f64);
-        let shrink = [
-            ("SPARSE_MEDIAN_K_RADII", SPARSE_MEDIAN_K_RADII.into()),
-            ("ISOLATED_SCORE", ISOLATED_SCORE.into()),
-            ("WIDER_BALL_K_RADII", WIDER_BALL_K_RADII.into()),
-            ("MAX_PLANE_DISTANCE_K_RADII", MAX_PLANE_DISTANCE_K_RADII.into()),
-            ("MAX_MEAN_DISTANCE_K_RADII", MAX_MEAN_DISTANCE_K_RADII.into()),
-            ("CROWD_WEIGHT_PER_NEIGHBOR", CROWD_WEIGHT_PER_NEIGHBOR.into()),
-            ("DOT_OUTLIER_SCORE", DOT_OUTLIER_SCORE.into()),
-            ("DROPPED_OUTLIER_SCORE", DROPPED_OUTLIER_SCORE.into()),
-            ("DOT_PX", DOT_PX.into()),
-            ("LEAST_ON", LEAST_ON.into()),
-            ("ON_DISC", ON_DISC.into()),
-            ("ON_DISC_NOISE", ON_DISC_NOISE.into()),
-            ("MIN_TESTED_FIRST_RADII", MIN_TESTED_FIRST_RADII.into()),
-            ("SURFACE_BALL_K_RADII", SURFACE_BALL_K_RADII.into()),
-            ("MAX_SURFACE_VARIATION", MAX_SURFACE_VARIATION.into()),
-            ("MIN_SURFACE_WIDTH_RATIO", MIN_SURFACE_WIDTH_RATIO.into()),
-            ("MAX_SURFACE_MEAN_RADII", MAX_SURFACE_MEAN_RADII.into()),
-            ("CELLS_TO_COUNT", CELLS_TO_COUNT.into()),
-            ("SUPPORT", SUPPORT.into()),
-            least_reach,
-        ];
-        let adapt = |round: Round| {
-            let own = [
-                ("ROUND", f64::from(round as u32)),
-                ("MAX_NOISE_K_RADII", MAX_NOISE_K_RADII.into()),
-                ("MAX_K_RADIUS_FIRST_RADII", MAX_K_RADIUS_FIRST_RADII.into()),
-                ("OUTLIER_OFFSET_NOISES", OUTLIER_OFFSET_NOISES.into()),
-                ("OUTLIER_OFFSET_KNOWN_NOISES", OUTLIER_OFFSET_KNOWN_NOISES.into()),
-                ("GRAZING_COSINE", GRAZING_COSINE.into()),
-                ("FARTHEST_ALONG", FARTHEST_ALONG.into()),
-                ("LONGEST_SHADOW", LONGEST_SHADOW.into()),
-            ];
-            Pass::new(gpu, &ADAPT, &[&quadric[..], &calls, &choose, &shrink, &own].concat())
-        };
-        let turn_rows = |round: Round| {
-            let own = [("ROUND", f64::from(round as u32)), together, few];
-            Pass::new(gpu, &TURN_ROWS, &[&quadric[..], &calls, &shrink, &rows, &own].concat())
-        };
+        let pass = |source| Pass::new(gpu, source, &[]);
+        let ask = |round: Round| Pass::new(gpu, &ASK, &[round.constant()]);
+        let adapt = |round: Round| Pass::new(gpu, &ADAPT, &[round.constant()]);
+        let turn_rows = |round: Round| Pass::new(gpu, &TURN_ROWS, &[round.constant(), together, few]);
         let which = |level: usize| {
             let told = gpu.uniform::<u32>("level")?;
             gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&(level as u32)));
             Ok::<_, Error>(told)
         };
-        let fine_sheets = ("FINE_SHEETS", SHEET_LEVELS[0] as f64);
-        let sheets = [together, parts, few, ("COVERED", COVERED.into()), ("COVERED_REACH", COVERED_REACH.into())];
-        let quantile = [
-            scales,
-            most_sampled,
-            ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
-            ("MIN_BALL_SHARE_DIVISOR", MIN_BALL_SHARE_DIVISOR as f64),
-            ("THIN_SHARE", THIN_SHARE.into()),
-            ("MAX_THIN_SHARE_RISE", MAX_THIN_SHARE_RISE.into()),
-            ("NOISE_QUANTILE", NOISE_QUANTILE.into()),
-            ("MAX_STEADY_RATIO", MAX_STEADY_RATIO.into()),
-            ("NOISE_FROM", NOISE_SHARES[0].into()),
-            ("NOISE_TO", NOISE_SHARES[1].into()),
-            ("DIFFERS_FROM", UNEVEN_NOISE_SHARES[0].into()),
-            ("DIFFERS_TO", UNEVEN_NOISE_SHARES[1].into()),
-            ("UNEVEN_NOISE_QUANTILE", UNEVEN_NOISE_QUANTILE.into()),
-            ("STEADY_SCALES", STEADY_SCALES as f64),
-            ("LEAST_PAIRS", LEAST_PAIRS as f64),
-        ];
+        let most_finest = ("MOST_FINEST", most_finest(gpu.most_bound()) as f64);
         Ok(Self {
-            arrange: Pass::new(
-                gpu,
-                &ARRANGE,
-                &[
-                    ("MOST_LEVELS", MOST_LEVELS as f64),
-                    ("MOST_FINEST", most_finest(gpu.most_bound()) as f64),
-                    most_sampled,
-                    fine_sheets,
-                    few,
-                ],
-            )?,
-            fill: Pass::new(gpu, &FILL, &[])?,
-            merge: Pass::new(gpu, &MERGE, &[])?,
+            arrange: Pass::new(gpu, &ARRANGE, &[most_finest, few])?,
+            fill: pass(&FILL)?,
+            merge: pass(&MERGE)?,
             which: (1..MOST_LEVELS).map(which).collect::<Result<_, _>>()?,
-            pick: Pass::new(gpu, &PICK, &[("NOISE_SAMPLE_COUNT", NOISE_SAMPLE_COUNT as f64), most_sampled])?,
-            sample: Pass::new(gpu, &SAMPLE_PASS, &[most_sampled])?,
-            scatter: Pass::new(
-                gpu,
-                &SCATTERS,
-                &[
-                    &quadric[..],
-                    &[
-                        together,
-                        most_sampled,
-                        least_reach,
-                        ("THIN_SCATTER_RADII", THIN_SCATTER_RADII.into()),
-                        ("ROUNDING_SCATTER_RADII", ROUNDING_SCATTER_RADII.into()),
-                    ],
-                ]
-                .concat(),
-            )?,
-            quantile: Pass::new(gpu, &QUANTILES, &quantile)?,
-            noise: Pass::new(
-                gpu,
-                &NOISE,
-                &[
-                    scales,
-                    most_sampled,
-                    ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
-                    ("MIN_K_RADIUS_CONTRAST", MIN_K_RADIUS_CONTRAST.into()),
-                    ("FULL_K_RADIUS_CONTRAST", FULL_K_RADIUS_CONTRAST.into()),
-                    ("STRUCTURE_GROWTH_POWER", STRUCTURE_GROWTH_POWER.into()),
-                    ("GROWTH_POWER_RAMP", GROWTH_POWER_RAMP.into()),
-                    ("BEYOND", noise::BEYOND as f64),
-                    ("THICK_NOISE", THICK_NOISE.into()),
-                    fine_sheets,
-                    ("COARSE_SHEETS", SHEET_LEVELS[1] as f64),
-                    ("SURE_FROM", CERTAIN_NOISE_SHARES[0].into()),
-                    ("SURE_TO", CERTAIN_NOISE_SHARES[1].into()),
-                    ("STEADY_SCALES", STEADY_SCALES as f64),
-                ],
-            )?,
-            forget: Pass::new(gpu, &FORGET, &[fine_sheets])?,
-            fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[&quadric[..], &calls, &choose, &sheets].concat())?,
+            pick: pass(&PICK)?,
+            sample: pass(&SAMPLE_PASS)?,
+            scatter: Pass::new(gpu, &SCATTERS, &[together])?,
+            quantile: pass(&QUANTILES)?,
+            noise: pass(&NOISE)?,
+            forget: pass(&FORGET)?,
+            fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[together, few])?,
             ask: [ask(Round::Active)?, ask(Round::Recovered)?],
             adapt: [adapt(Round::Active)?, adapt(Round::Recovered)?],
             turn_rows: [turn_rows(Round::Active)?, turn_rows(Round::Recovered)?],
@@ -403,7 +305,7 @@ impl AdaptPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, cell_start, points, .. } = screen;
         let AdaptBuffers { levels, arguments, clusters, asked, sheets, picked, .. } = buffers;
-        let groups = |level: usize| Groups::Counted(arguments.clone(), level as u64 * WORK_BYTES);
+        let groups = |level: usize| Groups::Counted(arguments.clone(), level as u64 * DISPATCH_BYTES);
         let mut steps = vec![
             self.arrange.step(gpu, &[frame, counters, levels, arguments, picked], 1),
             self.fill.step(gpu, &[frame, counters, levels, cell_start, points, clusters], groups(0)),
@@ -426,7 +328,7 @@ impl AdaptPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
         let AdaptBuffers { levels, arguments, clusters, asked, sheets, .. } = buffers;
-        let AdaptBuffers { picked, sampled, scatters, quantiles, measured, depth_noise, .. } = buffers;
+        let AdaptBuffers { picked, sampled, scatters, quantiles, statistics, depth_noise, .. } = buffers;
         let mut steps = Vec::new();
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
@@ -434,18 +336,18 @@ impl AdaptPasses {
                 self.pick.step(gpu, &[counters, surfels, picked], screen.groups(round.work_64())),
                 self.sample.step(gpu, &[surfels, picked, sampled], MOST_SAMPLED.div_ceil(GROUP) as u32),
                 self.scatter.step(gpu, &balls, (SCALES * MOST_SAMPLED) as u32),
-                self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], QUANTILES_TAKEN as u32),
-                self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
+                self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], (SAMPLE_PARTS * SCALES) as u32),
+                self.noise.step(gpu, &[frame, surfels, sampled, quantiles, statistics], 1),
             ]);
         }
-        let ask = [frame, counters, levels, measured, surfels, depth_noise, asked];
-        let fit = [frame, levels, clusters, measured, asked, depth_noise, sheets];
-        let adapt = [frame, counters, density, levels, clusters, measured, sheets, depth_noise, surfels];
-        let turn_rows = [frame, counters, density, levels, clusters, measured, depth_noise, surfels];
+        let ask = [frame, counters, levels, statistics, surfels, depth_noise, asked];
+        let fit = [frame, levels, clusters, statistics, asked, depth_noise, sheets];
+        let adapt = [frame, counters, density, levels, clusters, statistics, sheets, depth_noise, surfels];
+        let turn_rows = [frame, counters, density, levels, clusters, statistics, depth_noise, surfels];
         let round_at = round as usize;
         steps.extend([
             self.ask[round_at].step(gpu, &ask, screen.groups(round.work_64())),
-            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), MOST_LEVELS as u64 * WORK_BYTES)),
+            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), WORK_SHEETS as u64 * DISPATCH_BYTES)),
             self.adapt[round_at].step(gpu, &adapt, screen.groups(round.work_64())),
             self.turn_rows[round_at].step(gpu, &turn_rows, screen.groups(round.work_few())),
         ]);

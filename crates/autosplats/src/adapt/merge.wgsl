@@ -3,9 +3,10 @@
 // Reads: levels, which. Reads and writes: clusters.
 
 #import frame
+#import clusters
+#import filling
 #import groups
 #import levels
-#import filling
 
 @group(0) @binding(1) var<storage, read> levels: array<Level>;
 @group(0) @binding(2) var<storage, read_write> clusters: array<vec4f>;

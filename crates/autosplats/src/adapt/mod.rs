@@ -47,16 +47,12 @@ mod sheets;
 mod tests;
 mod through;
 
-#[cfg(test)]
-pub(crate) use cells::SLABS;
 pub(crate) use cpu::Adapter;
 pub(crate) use depth::DepthNoise;
 #[cfg(test)]
 pub(crate) use depth::DepthRun;
-pub(crate) use noise::Noise;
+pub(crate) use noise::{FrameStatistics, Noise};
 pub(crate) use rules::AdaptRules;
-#[cfg(test)]
-pub(crate) use sheets::SHEETS;
 
 /// Number of balls tried around each point, besides the neighbourhood that the search found.
 pub(crate) const SCALES: usize = 6;

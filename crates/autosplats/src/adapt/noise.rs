@@ -1,5 +1,6 @@
 //! The noise level: how far points scatter about the surface.
 
+use bytemuck::{Pod, Zeroable};
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -26,7 +27,7 @@ pub(super) const STRUCTURE_GROWTH_POWER: f32 = 0.8;
 /// Range of powers above [`STRUCTURE_GROWTH_POWER`] over which growth goes from structure to noise alone.
 pub(super) const GROWTH_POWER_RAMP: f32 = 0.4;
 /// Noise grows up to twice the k-radius that one in this many sampled points exceeds; outliers may be further apart.
-pub(super) const BEYOND: usize = 8;
+pub(super) const GROWTH_END_DIVISOR: usize = 8;
 /// Surfels per task when scatter is measured.
 const TASK: usize = 32;
 /// Surfels per task when the sample is picked.
@@ -71,19 +72,21 @@ pub(super) const STEADY_SCALES: usize = 2;
 /// the fits is as good; with less noise the fits would be worse.
 pub(super) const THICK_NOISE: f32 = 0.4;
 
-/// Statistics of a frame's surfels.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Statistics of a frame's surfels, laid out as in `shared/noise.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct FrameStatistics {
     pub(crate) noise: Noise,
     /// Median k-radius, world units; 0 if there are too few surfels.
     pub(crate) k_radius: f32,
     /// Level of the cells that have sheets.
-    pub(crate) sheet_level: usize,
+    pub(crate) sheet_level: u32,
 }
 
 /// Standard deviation of points from their surface. It may grow with the k-radius: distant points are sparser and
 /// noisier.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Noise {
     /// Noise level at k-radii of [`most`](Self::most) and beyond, world units.
     pub(crate) level: f32,
@@ -136,7 +139,7 @@ impl Noise {
                     // uncertain.
                     let both = least.sqrt() * most.sqrt();
                     let middle = if all > 0.0 { all.powf(1.0 - grows) * both.powf(grows) } else { both };
-                    let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;
+                    let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / GROWTH_END_DIVISOR].surfel.k_radius;
                     let level = by_steady * middle * (beyond / (small.sqrt() * large.sqrt())).powf(power);
                     return Self { level, power, most: beyond, sure };
                 }
@@ -178,7 +181,7 @@ pub(crate) fn measure(
     let noise = Noise::of(&sample);
     let middle = sample.get(sample.len() / 2).map_or(0.0, |middle| middle.surfel.k_radius);
     let k_radius = if sample.len() < LEAST_SAMPLE { 0.0 } else { middle };
-    let sheet_level = SHEET_LEVELS[usize::from(noise.at(middle) > THICK_NOISE * k_radius)];
+    let sheet_level = SHEET_LEVELS[usize::from(noise.at(middle) > THICK_NOISE * k_radius)] as u32;
     FrameStatistics { noise, k_radius, sheet_level }
 }
 

@@ -1,31 +1,16 @@
 // The noise level: how far points scatter about the surface. See the CPU form. One invocation.
 //
-// Reads: surfels, sampled, quantiles. Writes: measured: noise level, power of the k-radius, median k-radius, level of
-// the cells with sheets, largest k-radius of growth, and certainty.
+// Reads: surfels, sampled, quantiles. Writes: statistics.
 
 #import frame
-#import surfel
+#import noise
 #import quantiles
+#import surfel
 
 @group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(2) var<storage, read> sampled: array<u32>;
-@group(0) @binding(3) var<storage, read> quantiles: array<vec2u>;
-@group(0) @binding(4) var<storage, read_write> measured: array<f32>;
-
-override SCALES: u32;
-override MOST_SAMPLED: u32;
-override LEAST_SAMPLE: u32;
-override MIN_K_RADIUS_CONTRAST: f32;
-override FULL_K_RADIUS_CONTRAST: f32;
-override STRUCTURE_GROWTH_POWER: f32;
-override GROWTH_POWER_RAMP: f32;
-override BEYOND: u32;
-override THICK_NOISE: f32;
-override FINE_SHEETS: u32;
-override COARSE_SHEETS: u32;
-override SURE_FROM: f32;
-override SURE_TO: f32;
-override STEADY_SCALES: u32;
+@group(0) @binding(3) var<storage, read> quantiles: array<Quantile>;
+@group(0) @binding(4) var<storage, read_write> statistics: FrameStatistics;
 
 // Noise level of a part of the sample with about the same density; 0 if the part is too small.
 fn scatter_level(part: u32) -> f32 {
@@ -35,17 +20,17 @@ fn scatter_level(part: u32) -> f32 {
     var plateau = 0.0;
     for (var scale = 0u; scale < SCALES; scale++) {
         let found = quantiles[part * SCALES + scale];
-        let now = bitcast<f32>(found.y);
-        if found.x == OF_THIN_BALLS {
+        let now = found.value;
+        if found.kind == OF_THIN_BALLS {
             return now;
         }
         // No scale is thin. Where scatter grows least to the next scale it is noise; elsewhere points fill the ball or
         // are structure.
-        if found.x == OF_ALL_BALLS && before >= 0.0 && now < least_growth * before {
+        if found.kind == OF_ALL_BALLS && before >= 0.0 && now < least_growth * before {
             least_growth = now / before;
             plateau = before;
         }
-        before = select(-1.0, now, found.x == OF_ALL_BALLS);
+        before = select(-1.0, now, found.kind == OF_ALL_BALLS);
     }
     return plateau;
 }
@@ -53,9 +38,9 @@ fn scatter_level(part: u32) -> f32 {
 // Certainty that the noise of the whole sample is noise, 0 to 1.
 fn noise_certainty() -> f32 {
     for (var scale = 0u; scale < SCALES; scale++) {
-        if quantiles[ALL * SCALES + scale].x == OF_THIN_BALLS {
-            let share = bitcast<f32>(quantiles[SAMPLE_PARTS * SCALES + min(scale, STEADY_SCALES - 1u)].y);
-            return saturate((share - SURE_FROM) * (1.0 / (SURE_TO - SURE_FROM)));
+        if quantiles[ALL * SCALES + scale].kind == OF_THIN_BALLS {
+            let share = quantiles[SAMPLE_PARTS * SCALES + min(scale, STEADY_SCALES - 1u)].value;
+            return saturate((share - CERTAIN_NOISE_SHARES[0]) * (1.0 / (CERTAIN_NOISE_SHARES[1] - CERTAIN_NOISE_SHARES[0])));
         }
     }
     return 0.0;
@@ -66,15 +51,15 @@ fn k_radius(rank: u32) -> f32 {
     return surfels[sampled[rank]].k_radius;
 }
 
-// Level, power and largest k-radius of growth.
-fn noise_of_sample() -> vec3f {
+fn noise_of_sample() -> Noise {
+    let sure = noise_certainty();
     let len = sampled[MOST_SAMPLED];
     let all = scatter_level(ALL);
     // Of the whole sample, as the thirds may take their levels from different scales.
     let by_steady = select(1.0, scatter_level(STEADY_ALL) / all, all > 0.0);
     let third = len / 3u;
     if third == 0u {
-        return vec3f(by_steady * all, 0.0, 0.0);
+        return Noise(by_steady * all, 0.0, 0.0, sure);
     }
     let small = k_radius(third / 2u);
     let large = k_radius(len - third + third / 2u);
@@ -92,28 +77,24 @@ fn noise_of_sample() -> vec3f {
                 // Through the geometric mean of both thirds, blended with the level of all where growth is uncertain.
                 let both = sqrt(least) * sqrt(most);
                 let middle = select(both, pow(all, 1.0 - grows) * pow(both, grows), all > 0.0);
-                let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);
+                let beyond = 2.0 * k_radius(len - 1u - len / GROWTH_END_DIVISOR);
                 let level = by_steady * middle * pow(beyond / (sqrt(small) * sqrt(large)), power);
-                return vec3f(level, power, beyond);
+                return Noise(level, power, beyond, sure);
             }
         }
     }
-    return vec3f(by_steady * all, 0.0, 0.0);
+    return Noise(by_steady * all, 0.0, 0.0, sure);
 }
 
 @compute @workgroup_size(1)
 fn noise() {
     let found = noise_of_sample();
-    measured[0] = found.x;
-    measured[1] = found.y;
-    measured[4] = found.z;
-    measured[5] = noise_certainty();
     let len = sampled[MOST_SAMPLED];
     var middle = 0.0;
     if len > 0u {
         middle = k_radius(len / 2u);
     }
-    measured[2] = select(0.0, middle, len >= LEAST_SAMPLE);
-    let usual = found.x * select(pow(min(middle / found.z, 1.0), found.y), 1.0, found.y == 0.0);
-    measured[3] = f32(select(FINE_SHEETS, COARSE_SHEETS, usual > THICK_NOISE * measured[2]));
+    let usual = select(0.0, middle, len >= LEAST_SAMPLE);
+    let is_thick = noise_at(found, middle) > THICK_NOISE * usual;
+    statistics = FrameStatistics(found, usual, select(SHEET_LEVELS[0], SHEET_LEVELS[1], is_thick));
 }

@@ -3,15 +3,11 @@
 // Reads: counters, surfels. Writes: picked, the unordered indices of the sampled surfels, then their number.
 
 #import groups
-#import counters
 #import surfel
 
 @group(0) @binding(0) var<storage, read> counters: array<u32>;
 @group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(2) var<storage, read_write> picked: array<atomic<u32>>;
-
-override NOISE_SAMPLE_COUNT: u32;
-override MOST_SAMPLED: u32;
 
 fn hash_index(number: u32) -> u32 {
     let first = (number ^ (number >> 16u)) * 0x85ebca6bu;

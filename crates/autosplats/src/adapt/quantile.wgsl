@@ -1,32 +1,16 @@
 // Quantiles of scatter, a workgroup each: for every ball size of the sample's densest third, of its sparsest third, of
 // all, and of all by steady shares.
 //
-// Reads: sampled, scatters. Writes: quantiles, each as its kind and its bits. After them, for each of the first sizes,
-// the bits of the steady share of the largest size up to it that has one; below 0 if none has.
+// Reads: sampled, scatters. Writes: quantiles. After them, for each of the first sizes, the steady share of the largest
+// size up to it that has one; below 0 if none has.
 
 #import frame
-#import scatters
 #import quantiles
+#import scatters
 
 @group(0) @binding(1) var<storage, read> sampled: array<u32>;
 @group(0) @binding(2) var<storage, read> scatters: array<u32>;
-@group(0) @binding(3) var<storage, read_write> quantiles: array<vec2u>;
-
-override SCALES: u32;
-override MOST_SAMPLED: u32;
-override LEAST_SAMPLE: u32;
-override MIN_BALL_SHARE_DIVISOR: u32;
-override THIN_SHARE: f32;
-override MAX_THIN_SHARE_RISE: f32;
-override NOISE_QUANTILE: f32;
-override MAX_STEADY_RATIO: f32;
-override NOISE_FROM: f32;
-override NOISE_TO: f32;
-override DIFFERS_FROM: f32;
-override DIFFERS_TO: f32;
-override UNEVEN_NOISE_QUANTILE: f32;
-override STEADY_SCALES: u32;
-override LEAST_PAIRS: u32;
+@group(0) @binding(3) var<storage, read_write> quantiles: array<Quantile>;
 
 // Balls that hold enough to fit, and thin balls: of the workgroup's size, then of the next.
 var<workgroup> fitted: array<atomic<u32>, 2>;
@@ -104,7 +88,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         most_steady = max(most_steady, steady_share(size));
     }
     let is_asked = is_thin && part == STEADY_ALL;
-    let differs = saturate((first_steady - DIFFERS_FROM) * (1.0 / (DIFFERS_TO - DIFFERS_FROM)));
+    let differs = saturate((first_steady - UNEVEN_NOISE_SHARES[0]) * (1.0 / (UNEVEN_NOISE_SHARES[1] - UNEVEN_NOISE_SHARES[0])));
     let raised = select(0.0, differs * (UNEVEN_NOISE_QUANTILE - NOISE_QUANTILE), is_asked && scale == 0u);
     let at = u32((NOISE_QUANTILE + raised) * f32(select(all_fitted, all_thin, is_thin)));
     // The largest value with at most `at` values below it, found bit by bit.
@@ -121,7 +105,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         workgroupBarrier();
         found = select(found, tried, atomicLoad(&below[bit]) <= at);
     }
-    let is_noise = saturate((most_steady - NOISE_FROM) * (1.0 / (NOISE_TO - NOISE_FROM)));
+    let is_noise = saturate((most_steady - NOISE_SHARES[0]) * (1.0 / (NOISE_SHARES[1] - NOISE_SHARES[0])));
     if is_asked && scale < STEADY_SCALES && most_steady >= 0.0 {
         found = bitcast<u32>(is_noise * bitcast<f32>(found));
     }
@@ -130,10 +114,10 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         for (var size = 1u; size <= scale; size++) {
             of_largest = select(of_largest, steady_share(size), steady_share(size) >= 0.0);
         }
-        quantiles[SAMPLE_PARTS * SCALES + scale] = vec2u(TOO_FEW_BALLS, bitcast<u32>(of_largest));
+        quantiles[SAMPLE_PARTS * SCALES + scale] = Quantile(TOO_FEW_BALLS, of_largest);
     }
     if local == 0u {
         let tells = select(OF_ALL_BALLS, OF_THIN_BALLS, is_thin);
-        quantiles[workgroup.x] = vec2u(select(TOO_FEW_BALLS, tells, all_fitted >= least), found);
+        quantiles[workgroup.x] = Quantile(select(TOO_FEW_BALLS, tells, all_fitted >= least), bitcast<f32>(found));
     }
 }

@@ -28,8 +28,8 @@ pub(super) const MIN_AREA_RATIO: f32 = 0.25;
 /// Radius of the ball in which an area has to go on, in distances between scan lines. The ratio of variances has to
 /// reach [`MIN_AREA_RATIO`] there: three wires have 0.18, four scan lines or the border of many 0.33. The ball's weight
 /// has to grow more than its radius: that of areas grows with the square, that of a closed curve less.
-pub(super) const BEYOND: f32 = 4.0;
-/// Least and largest radius of the ball of [`BEYOND`], in radii of the first ball.
+pub(super) const BEYOND_LINE_DISTANCES: f32 = 4.0;
+/// Least and largest radius of the ball of [`BEYOND_LINE_DISTANCES`], in radii of the first ball.
 pub(super) const BEYOND_RADII: [f32; 2] = [STEP, STEP * STEP * STEP];
 /// Least variance across one side of a first ball, over that along. With less, the side holds the scan line alone.
 pub(super) const MIN_SIDE_AREA_RATIO: f32 = 0.05;
@@ -118,7 +118,7 @@ fn area(
         plane(radius, None).filter(|plane| is_area(plane, MIN_AREA_RATIO))
     })?;
     let [least, most] = BEYOND_RADII.map(|radii| radii * radius);
-    let beyond = (BEYOND * k_radius * apart(radius / k_radius, k, first.weight)).clamp(least, most);
+    let beyond = (BEYOND_LINE_DISTANCES * k_radius * apart(radius / k_radius, k, first.weight)).clamp(least, most);
     let goes_on = |near: &Plane, far: Option<Plane>| {
         far.is_some_and(|far| is_area(&far, MIN_AREA_RATIO) & (far.weight * radius > near.weight * beyond))
     };

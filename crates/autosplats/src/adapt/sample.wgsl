@@ -8,8 +8,6 @@
 @group(0) @binding(1) var<storage, read> picked: array<u32>;
 @group(0) @binding(2) var<storage, read_write> sampled: array<u32>;
 
-override MOST_SAMPLED: u32;
-
 // Bits of k-radii, which sort as the k-radii do, and indices; four at a time for fewer rounds of the loop.
 var<workgroup> k_radii: array<vec4u, MOST_SAMPLED / 4u>;
 var<workgroup> places: array<vec4u, MOST_SAMPLED / 4u>;

@@ -3,24 +3,23 @@
 // Reads: counters, density, surfels, levels, clusters, sampled. Writes: scatters, ball size by ball size.
 
 #import frame
-#import groups
-#import counters
 #import base_radius
+#import density
+#import groups
+#import levels
 #import quadric
-#import together
 #import scatters
+#import screen
+#import surfel
+#import together
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(4) var<storage, read> levels: array<Level>;
 @group(0) @binding(5) var<storage, read> clusters: array<vec4f>;
 @group(0) @binding(6) var<storage, read> sampled: array<u32>;
 @group(0) @binding(7) var<storage, read_write> scatters: array<u32>;
-
-override MOST_SAMPLED: u32;
-override THIN_SCATTER_RADII: f32;
-override ROUNDING_SCATTER_RADII: f32;
 
 @compute @workgroup_size(TOGETHER)
 fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -32,7 +31,8 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         return;
     }
     let surfel = surfels[sampled[rank]];
-    var radius = base_radius(surfel, counters[CELL_PX], counters[CELL_COLUMNS]) * STEP;
+    let cell = density[density_cell(pixel_xy(surfel.pixel), counters[CELL_PX], counters[CELL_COLUMNS])];
+    var radius = base_radius(surfel, initial_radius_of(cell.count, counters[CELL_PX], surfel.center.z)) * STEP;
     for (var smaller = 0u; smaller < scale; smaller++) {
         radius *= STEP;
     }

@@ -25,12 +25,12 @@ mod tests;
 /// distances wide; the smallest balls have a radius of three.
 pub(super) const SHEET_LEVELS: [usize; 2] = [1, 2];
 /// Distance from a sheet, in noise levels, up to which a cluster needs no sheet of its own.
-pub(super) const COVERED: f32 = 2.0;
-/// Squared distance from a sheet's axis, in squared radii, up to which [`COVERED`] applies. At a grazing angle a cell
+pub(super) const COVERED_NOISES: f32 = 2.0;
+/// Squared distance from a sheet's axis, in squared radii, up to which [`COVERED_NOISES`] applies. At a grazing angle a cell
 /// is a long strip of surface. A larger value makes normals along silhouettes worse.
 pub(super) const COVERED_REACH: f32 = 0.12;
 /// Most sheets of a cell.
-pub(crate) const SHEETS: usize = 4;
+pub(super) const SHEETS: usize = 4;
 /// Parts of a pixel in which k-radii are summed up. Integer sums do not depend on their order.
 pub(super) const K_RADIUS_PARTS_PER_PX: f32 = 64.0;
 /// Cap of a summed k-radius, in pixels. Sums over nine cells of 32 pixels with two points per pixel stay below 2³².
@@ -256,7 +256,7 @@ fn fit_cell<S: Simd>(
         for Cluster { mean, count } in &mut left {
             if *count > 0.0 {
                 let (height, near) = sheet.over((*mean).into());
-                if height.abs() < COVERED * noise && near > 1.0 - COVERED_REACH {
+                if height.abs() < COVERED_NOISES * noise && near > 1.0 - COVERED_REACH {
                     *count = 0.0;
                 }
             }

@@ -2,28 +2,31 @@
 // a few surfels fits those on scan lines together, one after the other. Such surfels are rare but need several balls
 // each; with an invocation per surfel, neighbours would wait. See the CPU form.
 //
-// Reads: density, levels, clusters, measured, depth_noise. Reads and writes: counters, surfels.
+// Reads: density, levels, clusters, statistics, depth_noise. Reads and writes: counters, surfels.
 
 #import frame
-#import groups
-#import counters
 #import base_radius
 #import calls
+#import density
 #import depth_noise
-#import together
+#import groups
+#import levels
+#import noise
+#import round
 #import rows
+#import screen
 #import shrink
+#import surfel
+#import together
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> levels: array<Level>;
 @group(0) @binding(4) var<storage, read> clusters: array<vec4f>;
-@group(0) @binding(5) var<storage, read> measured: array<f32>;
+@group(0) @binding(5) var<storage, read> statistics: FrameStatistics;
 @group(0) @binding(6) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(7) var<storage, read_write> surfels: array<Surfel>;
 
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
 // Surfels of a workgroup.
 override ITEMS_PER_GROUP: u32;
 
@@ -52,7 +55,7 @@ fn turn_rows(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     workgroupBarrier();
     for (var index = local; index < ITEMS_PER_GROUP && first + index < len; index += TOGETHER) {
         let surfel = surfels[first_of_round + first + index];
-        if is_row(surfel, known_beyond(noise_at(surfel.k_radius), surfel.center, surfel.source).noise) {
+        if is_row(surfel, known_beyond(noise_at(statistics.noise, surfel.k_radius), surfel.center, surfel.source).noise) {
             atomicOr(&found_rows, 1u << index);
         }
     }
@@ -70,11 +73,12 @@ fn turn_rows(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
             shared_surfel = surfels[place];
         }
         let surfel = workgroupUniformLoad(&shared_surfel);
-        let own_radius = initial_radius(surfel, all.cell_px, all.cell_columns);
-        let area = area(surfel, base_radius(surfel, all.cell_px, all.cell_columns));
+        let cell = density[density_cell(pixel_xy(surfel.pixel), all.cell_px, all.cell_columns)];
+        let own_radius = initial_radius_of(cell.count, all.cell_px, surfel.center.z);
+        let area = area(surfel, base_radius(surfel, own_radius));
         var out = turned(surfel, area);
         if area.radius == 0.0 {
-            out.radius = shrunk(out, own_radius);
+            out.radius = shrunk(out, own_radius, statistics.k_radius);
         }
         let is_out = is_dropped(out);
         if surfel.k_radius > MIN_TESTED_FIRST_RADII * own_radius {

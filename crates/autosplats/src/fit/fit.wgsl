@@ -4,41 +4,22 @@
 // Reads: counters, density, points, source, queries, neighborhoods. Writes: surfels, counters.
 
 #import frame
-#import groups
-#import counters
 #import density
+#import eigen
+#import groups
+#import neighborhood
+#import orthonormal
+#import round
 #import screen
 #import surfel
-#import eigen
-#import orthonormal
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(4) var<storage, read> source: array<u32>;
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
 @group(0) @binding(6) var<storage, read> neighborhoods: array<Neighborhood>;
 @group(0) @binding(7) var<storage, read_write> surfels: array<Surfel>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
-override MAX_LINE_EIGENVALUE_RATIO: f32;
-override MIN_LINE_SINE: f32;
-override MIN_SCAN_LINE_NEIGHBORS: f32;
-override ISOLATED_DOT_RADIUS_PX: f32;
-override DOT_CURVATURE: f32;
-override MAX_CULLED_FIRST_RADII: f32;
-override MAX_MEAN_OFFSET_K_RADII: f32;
-override MAX_SPARSE_MEAN_OFFSET_K_RADII: f32;
-override SPARSE_FIRST_RADII: f32;
-override MIN_COMPARED_NEIGHBORS: f32;
-override MAX_PLANE_OFFSET_K_RADII: f32;
-override MIN_FLAT_OFFSET_RATIO: f32;
-override FEW_NEIGHBORS: f32;
-override FEW_NEIGHBORS_FIRST_RADII: f32;
-override MIN_SURFACE_POINTS: u32;
-
-const MIN_POSITIVE = 1.1754943508222875e-38;
 
 // Values that all queries of a workgroup share.
 struct Task {
@@ -147,7 +128,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     let center = point.position_view;
     let face = plane(sums, to_eye(center));
     let cell = density[density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns)];
-    let first = first_radius(cell.x, task.cell_px, center.z);
+    let first = initial_radius_of(cell.count, task.cell_px, center.z);
 
     var radius = 0.0;
     if sums.count > 0.0 {
@@ -159,7 +140,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     if frame.keep_outliers == 0u && is_outlier(sums, face, sparser) {
         radius = 0.0;
     }
-    if center.z > culling_depth(bitcast<f32>(cell.y), task.cell_px) {
+    if center.z > culling_depth(cell.nearest, task.cell_px) {
         radius = min(radius, splat_radius(MAX_CULLED_FIRST_RADII * first, f32(frame.k)));
     }
     let screen_and_flags = query | select(0u, LINE, face.is_line);

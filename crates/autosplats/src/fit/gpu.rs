@@ -1,23 +1,34 @@
 //! The fit on the GPU: one invocation per point.
 
-use super::Surfel;
-use super::alone::{
-    FEW_NEIGHBORS, FEW_NEIGHBORS_FIRST_RADII, MAX_MEAN_OFFSET_K_RADII, MAX_PLANE_OFFSET_K_RADII,
-    MAX_SPARSE_MEAN_OFFSET_K_RADII, MIN_COMPARED_NEIGHBORS, MIN_FLAT_OFFSET_RATIO, MIN_SURFACE_POINTS,
-    SPARSE_FIRST_RADII,
-};
-use super::cpu::{
-    DOT_CURVATURE, ISOLATED_DOT_RADIUS_PX, MAX_CULLED_FIRST_RADII, MAX_LINE_EIGENVALUE_RATIO, MIN_LINE_SINE,
-    MIN_SCAN_LINE_NEIGHBORS,
-};
 use super::eigen::SWEEPS;
+use super::{Surfel, alone, cpu};
 use crate::Error;
-use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::{Round, ScreenBuffers};
+use crate::gpu::{Gpu, Library, Pass, Step, constants, passes};
+use crate::project::gpu::{Counter, Round, ScreenBuffers};
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[FIT];
-const FIT: PassSource = PassSource::new("fit/fit", include_str!("fit.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: &[],
+    constants: &[
+        Counter::CONSTANTS,
+        constants!(in alone:
+            FEW_NEIGHBORS, FEW_NEIGHBORS_FIRST_RADII, MAX_MEAN_OFFSET_K_RADII, MAX_PLANE_OFFSET_K_RADII,
+            MAX_SPARSE_MEAN_OFFSET_K_RADII, MIN_COMPARED_NEIGHBORS, MIN_FLAT_OFFSET_RATIO, MIN_SURFACE_POINTS,
+            SPARSE_FIRST_RADII
+        ),
+        constants!(in cpu:
+            DOT_CURVATURE, ISOLATED_DOT_RADIUS_PX, MAX_CULLED_FIRST_RADII, MAX_LINE_EIGENVALUE_RATIO, MIN_LINE_SINE,
+            MIN_SCAN_LINE_NEIGHBORS
+        ),
+        constants!(in Surfel: BACK, LINE),
+        constants![SWEEPS],
+    ],
+};
+
+passes! {
+    "fit", LIBRARY;
+    FIT = "fit",
+}
 
 /// Allocates the surfels of `capacity` queries.
 ///
@@ -39,28 +50,7 @@ impl FitPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        let round = |round: Round| {
-            let constants = [
-                ("ROUND", f64::from(round as u32)),
-                ("SWEEPS", SWEEPS as f64),
-                ("MAX_LINE_EIGENVALUE_RATIO", MAX_LINE_EIGENVALUE_RATIO.into()),
-                ("MIN_LINE_SINE", MIN_LINE_SINE.into()),
-                ("MIN_SCAN_LINE_NEIGHBORS", MIN_SCAN_LINE_NEIGHBORS.into()),
-                ("ISOLATED_DOT_RADIUS_PX", ISOLATED_DOT_RADIUS_PX.into()),
-                ("DOT_CURVATURE", DOT_CURVATURE.into()),
-                ("MAX_CULLED_FIRST_RADII", MAX_CULLED_FIRST_RADII.into()),
-                ("MAX_MEAN_OFFSET_K_RADII", MAX_MEAN_OFFSET_K_RADII.into()),
-                ("MAX_SPARSE_MEAN_OFFSET_K_RADII", MAX_SPARSE_MEAN_OFFSET_K_RADII.into()),
-                ("SPARSE_FIRST_RADII", SPARSE_FIRST_RADII.into()),
-                ("MIN_COMPARED_NEIGHBORS", MIN_COMPARED_NEIGHBORS.into()),
-                ("MAX_PLANE_OFFSET_K_RADII", MAX_PLANE_OFFSET_K_RADII.into()),
-                ("MIN_FLAT_OFFSET_RATIO", MIN_FLAT_OFFSET_RATIO.into()),
-                ("FEW_NEIGHBORS", FEW_NEIGHBORS.into()),
-                ("FEW_NEIGHBORS_FIRST_RADII", FEW_NEIGHBORS_FIRST_RADII.into()),
-                ("MIN_SURFACE_POINTS", MIN_SURFACE_POINTS as f64),
-            ];
-            Pass::new(gpu, &FIT, &constants)
-        };
+        let round = |round: Round| Pass::new(gpu, &FIT, &[round.constant()]);
         Ok(Self { rounds: [round(Round::Active)?, round(Round::Recovered)?] })
     }
 

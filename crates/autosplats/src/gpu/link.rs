@@ -1,106 +1,202 @@
-//! Links WGSL: `#import name` includes `shared/name.wgsl` once. See docs/decisions/0018-wgsl-linker.md.
+//! Links WGSL: a pass, the files that it imports, and the constants of Rust that they name. See
+//! docs/decisions/0018-wgsl-linker.md.
 
-/// Shared files by name. A file may import only files listed before it.
-const SHARED: &[(&str, &str)] = &[
-    ("frame", include_str!("../shared/frame.wgsl")),
-    ("picture", include_str!("../shared/picture.wgsl")),
-    ("gaps", include_str!("../shared/gaps.wgsl")),
-    ("groups", include_str!("../shared/groups.wgsl")),
-    ("put_work", include_str!("../shared/put_work.wgsl")),
-    ("counters", include_str!("../shared/counters.wgsl")),
-    ("rank", include_str!("../shared/rank.wgsl")),
-    ("half", include_str!("../shared/half.wgsl")),
-    ("fitted", include_str!("../shared/fitted.wgsl")),
-    ("project_point", include_str!("../shared/project_point.wgsl")),
-    ("count_dropped", include_str!("../shared/count_dropped.wgsl")),
-    ("add_sixteenth", include_str!("../shared/add_sixteenth.wgsl")),
-    ("divide", include_str!("../shared/divide.wgsl")),
-    ("keys", include_str!("../shared/keys.wgsl")),
-    ("density", include_str!("../shared/density.wgsl")),
-    ("cell_order", include_str!("../shared/cell_order.wgsl")),
-    ("screen", include_str!("../shared/screen.wgsl")),
-    ("matters", include_str!("../shared/matters.wgsl")),
-    ("culled", include_str!("../shared/culled.wgsl")),
-    ("depth_noise", include_str!("../shared/depth_noise.wgsl")),
-    ("surfel", include_str!("../shared/surfel.wgsl")),
-    ("eigen", include_str!("../shared/eigen.wgsl")),
-    ("orthonormal", include_str!("../shared/orthonormal.wgsl")),
-    ("levels", include_str!("../shared/levels.wgsl")),
-    ("clusters", include_str!("../shared/clusters.wgsl")),
-    ("filling", include_str!("../shared/filling.wgsl")),
-    ("quadric", include_str!("../shared/quadric.wgsl")),
-    ("alone", include_str!("../shared/alone.wgsl")),
-    ("together", include_str!("../shared/together.wgsl")),
-    ("base_radius", include_str!("../shared/base_radius.wgsl")),
-    ("noise", include_str!("../shared/noise.wgsl")),
-    ("calls", include_str!("../shared/calls.wgsl")),
-    ("choose", include_str!("../shared/choose.wgsl")),
-    ("through", include_str!("../shared/through.wgsl")),
-    ("rows", include_str!("../shared/rows.wgsl")),
-    ("shrink", include_str!("../shared/shrink.wgsl")),
-    ("sheet", include_str!("../shared/sheet.wgsl")),
-    ("scatters", include_str!("../shared/scatters.wgsl")),
-    ("quantiles", include_str!("../shared/quantiles.wgsl")),
-    ("window", include_str!("../shared/window.wgsl")),
-    ("window_points", include_str!("../shared/window_points.wgsl")),
-    ("communication", include_str!("../shared/communication.wgsl")),
-    ("splat_box", include_str!("../shared/splat_box.wgsl")),
-    ("radius_search", include_str!("../shared/radius_search.wgsl")),
-    ("answer", include_str!("../shared/answer.wgsl")),
-    ("nearest", include_str!("../shared/nearest.wgsl")),
-    ("search_task", include_str!("../shared/search_task.wgsl")),
-    ("reproject", include_str!("../shared/reproject.wgsl")),
-    ("past", include_str!("../shared/past.wgsl")),
-    ("layers", include_str!("../shared/layers.wgsl")),
-    ("blocks", include_str!("../shared/blocks.wgsl")),
-    ("blurred", include_str!("../shared/blurred.wgsl")),
-    ("range_keys", include_str!("../shared/range_keys.wgsl")),
-    ("kd_tree", include_str!("../shared/kd_tree.wgsl")),
-    ("kd_build", include_str!("../shared/kd_build.wgsl")),
-    ("kd_work", include_str!("../shared/kd_work.wgsl")),
-    ("kd_chunk", include_str!("../shared/kd_chunk.wgsl")),
-    ("srgb", include_str!("../shared/srgb.wgsl")),
-    ("shading", include_str!("../shared/shading.wgsl")),
-    ("depth_map", include_str!("../shared/depth_map.wgsl")),
-    ("hidden", include_str!("../shared/hidden.wgsl")),
-    ("recovered", include_str!("../shared/recovered.wgsl")),
-    ("splat", include_str!("../shared/splat.wgsl")),
-    ("fragment", include_str!("../shared/fragment.wgsl")),
-    ("redraw", include_str!("../shared/redraw.wgsl")),
-    ("marked", include_str!("../shared/marked.wgsl")),
-    ("moved", include_str!("../shared/moved.wgsl")),
-    ("erased", include_str!("../shared/erased.wgsl")),
-    ("patch", include_str!("../shared/patch.wgsl")),
-];
+use std::collections::HashSet;
 
-/// The source of a pass with all its imports.
+use super::recorder::GROUPS_PER_ROW;
+
+/// Name and text of a WGSL file that others import.
+pub(crate) type File = (&'static str, &'static str);
+
+/// The parts that the passes of a stage are made of.
+#[derive(Debug)]
+pub(crate) struct Library {
+    /// Files that passes import by name, beside those of `shared/`.
+    pub(crate) files: &'static [&'static [File]],
+    /// Constants that passes name.
+    pub(crate) constants: &'static [&'static [Constant]],
+}
+
+/// A constant of Rust in WGSL.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Constant {
+    /// The name in Rust. In WGSL, all names are in capitals: `NotFinite` is `NOT_FINITE`.
+    pub(crate) name: &'static str,
+    /// The value as an expression of WGSL.
+    pub(crate) value: fn() -> String,
+}
+
+impl Constant {
+    /// The declaration in WGSL.
+    pub(crate) fn in_wgsl(&self) -> String {
+        format!("const {} = {};\n", in_capitals(self.name), (self.value)())
+    }
+}
+
+/// A list of [`File`]s, in the folder `imports/` beside the Rust file unless another is given.
+macro_rules! files {
+    (in $folder:literal: $($name:literal),* $(,)?) => {
+        &[$(($name, include_str!(concat!($folder, "/", $name, ".wgsl")))),*]
+    };
+    ($($name:literal),* $(,)?) => {
+        $crate::gpu::files!(in "imports": $($name),*)
+    };
+}
+
+/// A list of [`Constant`]s: those of a module, or `NAME` and `NAME = value`.
+macro_rules! constants {
+    (in $module:ident: $($name:ident),* $(,)?) => {
+        $crate::gpu::constants![$($name = $module::$name),*]
+    };
+    ($($name:ident $(= $value:expr)?),* $(,)?) => {
+        &[$($crate::gpu::Constant {
+            name: stringify!($name),
+            value: || $crate::gpu::InWgsl::in_wgsl(&$crate::gpu::constants!(@ $name $($value)?)),
+        }),*]
+    };
+    (@ $name:ident) => { $name };
+    (@ $name:ident $value:expr) => { $value };
+}
+
+/// An enum whose variants are indices, and constants of WGSL; with `in "Prefix"`, their names begin with it.
+macro_rules! indices {
+    ($(#[$meta:meta])* $vis:vis enum $name:ident { $($variants:tt)* }) => {
+        $crate::gpu::indices! { $(#[$meta])* $vis enum $name in "" { $($variants)* } }
+    };
+    (
+        $(#[$meta:meta])*
+        $vis:vis enum $name:ident in $prefix:literal { $($(#[$doc:meta])* $variant:ident),* $(,)? }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        $vis enum $name { $($(#[$doc])* $variant),* }
+
+        impl $name {
+            /// The variants in WGSL.
+            pub(crate) const CONSTANTS: &[$crate::gpu::Constant] = &[$($crate::gpu::Constant {
+                name: concat!($prefix, stringify!($variant)),
+                value: || $crate::gpu::InWgsl::in_wgsl(&(Self::$variant as u32)),
+            }),*];
+        }
+    };
+}
+
+pub(crate) use {constants, files, indices};
+
+/// Files for all stages.
+const SHARED: Library = Library {
+    files: &[files!(in "../shared":
+        "density", "divide", "eigen", "frame", "groups", "half", "layers", "matters", "moved", "neighborhood",
+        "noise", "orthonormal", "picture", "project_point", "put_work", "range_keys", "rank", "reproject", "round", "screen", "surfel",
+    )],
+    constants: &[constants![GROUPS_PER_ROW, MAX_F32 = f32::MAX, MIN_POSITIVE = f32::MIN_POSITIVE, NO_POINT = u32::MAX]],
+};
+
+/// A value that constants of WGSL may have.
+pub(crate) trait InWgsl {
+    /// The value as an expression of WGSL, with its type.
+    fn in_wgsl(&self) -> String;
+}
+
+macro_rules! numbers {
+    ($($suffix:literal: $($number:ty),*;)*) => {
+        $($(impl InWgsl for $number {
+            fn in_wgsl(&self) -> String {
+                // The shortest digits that give the same bits when read.
+                format!(concat!("{:?}", $suffix), self)
+            }
+        })*)*
+    };
+}
+numbers! {
+    "f": f32;
+    "u": u32, usize;
+    "i": i32, isize;
+}
+
+/// A vector of up to four numbers, else an array.
+impl<T: InWgsl, const N: usize> InWgsl for [T; N] {
+    fn in_wgsl(&self) -> String {
+        let values: Vec<_> = self.iter().map(InWgsl::in_wgsl).collect();
+        let kind = if N > 4 { "array".to_owned() } else { format!("vec{N}") };
+        format!("{kind}({})", values.join(", "))
+    }
+}
+
+/// The source of a pass with all its imports and constants.
+///
+/// The order of declarations has no meaning in WGSL. The pass comes first, so that messages name its lines.
 ///
 /// # Panics
-/// If a name is unknown. The tests link every pass.
-pub(crate) fn link(source: &str) -> String {
-    let mut wanted = vec![false; SHARED.len()];
-    want(source, &mut wanted);
-    for at in (0..SHARED.len()).rev() {
-        if wanted[at] {
-            want(SHARED[at].1, &mut wanted);
+/// If an import is unknown. The tests link every pass.
+pub(crate) fn link(source: &str, library: &Library) -> String {
+    let mut files = vec![("", source)];
+    let mut read = 0;
+    while read < files.len() {
+        for name in imports(files[read].1) {
+            if !files.iter().any(|&(known, _)| known == name) {
+                let mut known = SHARED.files.iter().chain(library.files).copied().flatten();
+                let file = known.find(|(known, _)| *known == name);
+                files.push(*file.unwrap_or_else(|| panic!("no {name}.wgsl to import")));
+            }
         }
+        read += 1;
     }
-    let shared = SHARED.iter().zip(wanted).filter(|&(_, wanted)| wanted).map(|((_, source), _)| *source);
-    shared.chain([source]).map(without_imports).collect()
+    let mut linked: String = files.into_iter().map(|(_, source)| without_imports(source)).collect();
+    let words: HashSet<_> = linked.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').collect();
+    let constants = SHARED.constants.iter().chain(library.constants).copied().flatten();
+    let named = constants.filter(|constant| words.contains(in_capitals(constant.name).as_str()));
+    let declared: String = named.map(Constant::in_wgsl).collect();
+    linked.push_str(&declared);
+    linked
 }
 
 fn imports(source: &str) -> impl Iterator<Item = &str> {
     source.lines().filter_map(|line| line.strip_prefix("#import "))
 }
 
-fn want(source: &str, wanted: &mut [bool]) {
-    for name in imports(source) {
-        let at = SHARED.iter().position(|&(known, _)| known == name);
-        wanted[at.unwrap_or_else(|| panic!("no shared/{name}.wgsl"))] = true;
-    }
-}
-
-/// Keeps line numbers, so that messages about a file without imports name the right line.
+/// The source with empty lines in place of imports.
 fn without_imports(source: &str) -> String {
     source.lines().map(|line| if line.starts_with("#import ") { "\n".into() } else { format!("{line}\n") }).collect()
+}
+
+/// A name in capitals, with `_` between words: `KRadius` is `K_RADIUS`.
+fn in_capitals(name: &str) -> String {
+    let mut capitals = String::new();
+    for (at, letter) in name.char_indices() {
+        let is_lowercase = |letter: Option<char>| letter.is_some_and(|letter| letter.is_lowercase());
+        let begins = letter.is_uppercase() && is_lowercase(name[at + 1..].chars().next());
+        let follows = letter.is_uppercase() && is_lowercase(name[..at].chars().next_back());
+        if at > 0 && (begins || follows) {
+            capitals.push('_');
+        }
+        capitals.push(letter.to_ascii_uppercase());
+    }
+    capitals
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pass_gets_each_file_once_and_the_constants_that_it_names() {
+        const FAR: f32 = -1e-7;
+        const LIBRARY: Library = Library {
+            files: &[&[("a", "#import b\nfn a() {}"), ("b", "#import a\nfn b() {}"), ("c", "fn c() {}")]],
+            constants: &[constants![FAR, SIDES = [8u32, 2], UNUSED = 1u32]],
+        };
+        let linked = link("#import a\nfn pass() { use(FAR, SIDES, MAX_F32); }", &LIBRARY);
+        let expected = "\nfn pass() { use(FAR, SIDES, MAX_F32); }\n\nfn a() {}\n\nfn b() {}\n\
+                        const MAX_F32 = 3.4028235e38f;\nconst FAR = -1e-7f;\nconst SIDES = vec2(8u, 2u);\n";
+        assert_eq!(linked, expected);
+    }
+
+    #[test]
+    fn names_in_wgsl_are_in_capitals() {
+        for (name, expected) in [("MAX_F32", "MAX_F32"), ("NotFinite", "NOT_FINITE"), ("ShowKRadius", "SHOW_K_RADIUS")]
+        {
+            assert_eq!(in_capitals(name), expected);
+        }
+    }
 }

@@ -20,11 +20,8 @@ pub(crate) use device::test_gpu;
 pub use device::{AdapterSummary, adapters};
 pub(crate) use device::{Gpu, INT64_ATOMICS};
 pub(crate) use frame::FrameUniform;
-#[cfg(test)]
-pub(crate) use link::link;
-pub(crate) use pass::{Groups, Pass, PassSource, Step};
+pub(crate) use link::{Constant, File, InWgsl, Library, constants, files, indices, link};
+pub(crate) use pass::{Groups, Pass, PassSource, Step, passes};
 pub(crate) use raster::{DepthMask, Draw, Load, RasterPass, Target, Targets};
-#[cfg(test)]
-pub(crate) use recorder::GROUPS_PER_ROW;
 pub use recorder::PassTime;
-pub(crate) use recorder::{Clock, Recorder, stage_ms};
+pub(crate) use recorder::{Clock, DISPATCH_BYTES, Recorder, stage_ms};

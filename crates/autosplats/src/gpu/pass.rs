@@ -7,7 +7,7 @@ use std::sync::PoisonError;
 use wgpu::naga;
 
 use super::raster::Raster;
-use super::{Gpu, link::link};
+use super::{Gpu, Library, link};
 use crate::Error;
 
 /// The source of a pass.
@@ -19,19 +19,30 @@ pub(crate) struct PassSource {
     pub(crate) source: &'static str,
     /// Features of the shader beyond WebGPU's core.
     pub(crate) needs: wgpu::Features,
+    /// Its imports and constants.
+    pub(crate) library: &'static Library,
 }
 
+/// The passes of a stage: its folder, its [`Library`], and for each pass the file and the features that it needs.
+/// Defines a [`PassSource`] for each, and `PASSES` for tests.
+macro_rules! passes {
+    (
+        $folder:literal, $library:ident;
+        $($vis:vis $name:ident = $file:literal $(needs $needs:expr)?),* $(,)?
+    ) => {
+        $($vis const $name: $crate::gpu::PassSource = $crate::gpu::PassSource {
+            path: concat!($folder, "/", $file),
+            source: include_str!(concat!($file, ".wgsl")),
+            needs: wgpu::Features::empty()$(.union($needs))?,
+            library: &$library,
+        };)*
+        #[cfg(test)]
+        pub(crate) const PASSES: &[$crate::gpu::PassSource] = &[$($name),*];
+    };
+}
+pub(crate) use passes;
+
 impl PassSource {
-    /// A pass that runs on every WebGPU device.
-    pub(crate) const fn new(path: &'static str, source: &'static str) -> Self {
-        Self { path, source, needs: wgpu::Features::empty() }
-    }
-
-    /// A pass that draws and blends.
-    pub(crate) const fn blending(path: &'static str, source: &'static str) -> Self {
-        Self { path, source, needs: wgpu::Features::FLOAT32_BLENDABLE }
-    }
-
     pub(crate) fn entry_point(&self) -> &'static str {
         self.path.rsplit('/').next().unwrap_or(self.path)
     }
@@ -41,7 +52,7 @@ impl PassSource {
     /// # Panics
     /// If the source is not valid WGSL. All sources are our own.
     pub(crate) fn module(&self) -> naga::Module {
-        let source = link(self.source);
+        let source = link(self.source, self.library);
         naga::front::wgsl::parse_str(&source)
             .unwrap_or_else(|error| panic!("{}: {}", self.path, error.emit_to_string(&source)))
     }
@@ -256,13 +267,15 @@ mod tests {
 
     #[test]
     fn a_pass_is_compiled_once_for_each_set_of_constants() {
+        const LIBRARY: Library = Library { files: &[], constants: &[] };
         const CODE: &str = "override STEP: u32 = 1u;\n@group(0) @binding(0) var<storage, read_write> x: array<u32>;\n\
                             @compute @workgroup_size(1) fn count() { x[0] += STEP; }";
         const OTHER: &str = "@group(0) @binding(0) var<storage, read_write> x: array<u32>;\n\
                              @compute @workgroup_size(1) fn count() { x[0] += 3u; }";
         let Some(gpu) = test_gpu() else { return };
         let pass = |code, constants: &[(&str, f64)]| {
-            Pass::new(&gpu, &PassSource::new("count", code), constants).expect("a pass").pipeline
+            let source = PassSource { path: "count", source: code, needs: wgpu::Features::empty(), library: &LIBRARY };
+            Pass::new(&gpu, &source, constants).expect("a pass").pipeline
         };
         let first = pass(CODE, &[("STEP", 1.0)]);
         assert_eq!(first, pass(CODE, &[("STEP", 1.0)]), "the same pass");

@@ -8,7 +8,10 @@ use super::pass::{Groups, Step, StepWork};
 use crate::Error;
 
 /// Workgroups in a row of a dispatch. More than 65535 need a second dimension, which `shared/groups.wgsl` undoes.
-pub(crate) const GROUPS_PER_ROW: u32 = 32768;
+pub(super) const GROUPS_PER_ROW: u32 = 32768;
+
+/// Bytes of the arguments of an indirect dispatch: `Dispatch` of `shared/put_work.wgsl`.
+pub(crate) const DISPATCH_BYTES: u64 = size_of::<wgpu::util::DispatchIndirectArgs>() as u64;
 
 /// Most passes of a frame that can be timed.
 const MOST_PASSES: u32 = 512;

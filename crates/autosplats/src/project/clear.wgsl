@@ -3,11 +3,12 @@
 // Writes: keys, density, counters, sixteenths.
 
 #import frame
+#import density
 #import groups
 #import keys
 
-@group(0) @binding(1) var<storage, read_write> keys: array<vec2u>;
-@group(0) @binding(2) var<storage, read_write> density: array<vec2u>;
+@group(0) @binding(1) var<storage, read_write> keys: array<Key>;
+@group(0) @binding(2) var<storage, read_write> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read_write> counters: array<u32>;
 @group(0) @binding(4) var<storage, read_write> sixteenths: array<u32>;
 
@@ -15,10 +16,10 @@
 fn clear(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let index = group_index(workgroup) * 256u + local;
     if index < arrayLength(&keys) {
-        keys[index] = vec2u(EMPTY_KEY);
+        keys[index] = EMPTY_KEY;
     }
     if index < arrayLength(&density) {
-        density[index] = vec2u(0u, EMPTY_KEY);
+        density[index] = DensityCell(0u, infinity());
     }
     if index < arrayLength(&counters) {
         counters[index] = 0u;

@@ -3,13 +3,12 @@
 // Reads: keys, counters, block_sums. Writes: source, pixels, cell_start.
 
 #import frame
-#import groups
-#import counters
-#import rank
-#import keys
 #import cell_order
+#import groups
+#import keys
+#import rank
 
-@group(0) @binding(1) var<storage, read> keys: array<vec2u>;
+@group(0) @binding(1) var<storage, read> keys: array<Key>;
 @group(0) @binding(2) var<storage, read> counters: array<u32>;
 @group(0) @binding(3) var<storage, read> block_sums: array<u32>;
 @group(0) @binding(4) var<storage, read_write> source: array<u32>;
@@ -21,20 +20,20 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     rank_clear(local);
     let block = group_index(workgroup);
     let strip_px = counters[STRIP_PX];
-    for (var step = 0u; step < 8u; step++) {
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
         let flag = step * 256u + local;
-        let at = block * 2048u + flag;
+        let at = block * RANK_BLOCK_FLAGS + flag;
         if at < arrayLength(&keys) {
-            if keys[cell_slot(at, strip_px).slot].x != EMPTY_KEY {
+            if keys[cell_slot(at, strip_px).slot].point != NO_POINT {
                 rank_set(flag);
             }
         }
     }
     rank_finish(local);
     let before = block_sums[block];
-    for (var step = 0u; step < 8u; step++) {
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
         let flag = step * 256u + local;
-        let at = block * 2048u + flag;
+        let at = block * RANK_BLOCK_FLAGS + flag;
         if at < arrayLength(&keys) {
             let place = cell_slot(at, strip_px);
             let index = before + rank_of(flag);
@@ -42,8 +41,8 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
                 cell_start[place.cell] = index;
             }
             let key = keys[place.slot];
-            if key.x != EMPTY_KEY {
-                source[index] = key.x;
+            if key.point != NO_POINT {
+                source[index] = key.point;
                 pixels[index] = (place.pixel.y << 16u) | place.pixel.x;
             }
         }

@@ -1,19 +1,24 @@
-// Counts the screen points of each block of 2048 slots in cell order. Counts the screen points of each density cell
+// Counts the screen points of each block of slots in cell order. Counts the screen points of each density cell
 // and finds its nearest depth [Paper, §5.1].
 //
 // Reads: keys, counters. Writes: block_sums, density.
 
 #import frame
-#import groups
-#import counters
-#import keys
-#import density
 #import cell_order
+#import density
+#import groups
+#import keys
 
-@group(0) @binding(1) var<storage, read> keys: array<vec2u>;
+@group(0) @binding(1) var<storage, read> keys: array<Key>;
 @group(0) @binding(2) var<storage, read> counters: array<u32>;
 @group(0) @binding(3) var<storage, read_write> block_sums: array<u32>;
-@group(0) @binding(4) var<storage, read_write> density: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> density: array<CountedCell>;
+
+// A density cell with atomics. Depths, which are positive, have the order of their bits.
+struct CountedCell {
+    count: atomic<u32>,
+    nearest: atomic<u32>,
+}
 
 var<workgroup> owned: atomic<u32>;
 
@@ -28,16 +33,16 @@ fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let cell_px = counters[CELL_PX];
     let cell_columns = counters[CELL_COLUMNS];
     var own = 0u;
-    for (var step = 0u; step < 8u; step++) {
-        let at = block * 2048u + step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
+        let at = block * RANK_BLOCK_FLAGS + step * 256u + local;
         if at < arrayLength(&keys) {
             let place = cell_slot(at, strip_px);
             let key = keys[place.slot];
-            if key.x != EMPTY_KEY {
+            if key.point != NO_POINT {
                 own += 1u;
                 let cell = density_cell(place.pixel, cell_px, cell_columns);
-                atomicAdd(&density[2u * cell], 1u);
-                atomicMin(&density[2u * cell + 1u], key.y);
+                atomicAdd(&density[cell].count, 1u);
+                atomicMin(&density[cell].nearest, key.depth);
             }
         }
     }

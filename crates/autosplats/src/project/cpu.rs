@@ -27,7 +27,7 @@ pub(super) const STRIP_SPACINGS: f32 = 3.0;
 // Differs from the paper: the paper keeps the nearest point of each pixel only.
 pub(super) const MAX_SECOND_DEPTH_PX: f32 = 8.0;
 /// Side in pixels of the blocks that separate covered from empty screen when the density is measured.
-const OCCUPANCY_BLOCK_PX: usize = 16;
+pub(super) const OCCUPANCY_BLOCK_PX: usize = 16;
 
 /// Projects clouds. All buffers but the two lists `active` and `passive` are reused from frame to frame.
 #[derive(Debug, Default)]

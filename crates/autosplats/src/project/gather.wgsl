@@ -4,10 +4,8 @@
 
 #import frame
 #import groups
-#import counters
-#import screen
-#import half
 #import project_point
+#import screen
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> positions: array<f32>;

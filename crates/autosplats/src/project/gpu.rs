@@ -1,49 +1,64 @@
 //! Projection on the GPU: the steps of the CPU form, one pass each.
 
 pub(crate) use super::Round;
-use super::cpu::{MAX_SECOND_DEPTH_PX, STRIP_SPACINGS};
 use super::device_cloud::{Chunk, DeviceCloud};
-use super::{MARGIN_REACH, ScreenPoint};
+use super::{MARGIN_REACH, ScreenPoint, cpu};
 use crate::Error;
-use crate::gpu::{Gpu, Groups, INT64_ATOMICS, Pass, PassSource, Step};
+use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, INT64_ATOMICS, Library, Pass, Step, constants, files, indices, passes};
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] =
-    &[CLEAR, PROJECT, PROJECT_32, OCCUPANCY, GRID, COUNT, SCAN, COMPACT, GATHER, SPLIT_COUNT, SPLIT, WORK];
-const CLEAR: PassSource = PassSource::new("project/clear", include_str!("clear.wgsl"));
-const PROJECT: PassSource =
-    PassSource { needs: INT64_ATOMICS, ..PassSource::new("project/project", include_str!("project.wgsl")) };
-const PROJECT_32: PassSource = PassSource::new("project/project_32", include_str!("project_32.wgsl"));
-const OCCUPANCY: PassSource = PassSource::new("project/occupancy", include_str!("occupancy.wgsl"));
-const GRID: PassSource = PassSource::new("project/grid", include_str!("grid.wgsl"));
-const COUNT: PassSource = PassSource::new("project/count", include_str!("count.wgsl"));
-const SCAN: PassSource = PassSource::new("project/scan", include_str!("scan.wgsl"));
-const COMPACT: PassSource = PassSource::new("project/compact", include_str!("compact.wgsl"));
-const GATHER: PassSource = PassSource::new("project/gather", include_str!("gather.wgsl"));
-const SPLIT_COUNT: PassSource = PassSource::new("project/split_count", include_str!("split_count.wgsl"));
-const SPLIT: PassSource = PassSource::new("project/split", include_str!("split.wgsl"));
-const WORK: PassSource = PassSource::new("project/work", include_str!("work.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: &[files!["active", "add_sixteenth", "cell_order", "count_dropped", "keys"]],
+    constants: &[
+        Counter::CONSTANTS,
+        Work::CONSTANTS,
+        constants!(in cpu: MAX_SECOND_DEPTH_PX, OCCUPANCY_BLOCK_PX, STRIP_SPACINGS),
+        constants![MARGIN_REACH, RANK_BLOCK_FLAGS],
+    ],
+};
 
-/// Indirect dispatches whose number of workgroups depends on counters, in the order of `work.wgsl`. A variant names
-/// the items and how many a workgroup takes; `Blocks` are blocks of [`RANK_BLOCK_FLAGS`].
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Work {
-    Visible256,
-    VisibleBlocks,
-    PassiveBlocks,
-    Active64,
-    Active256,
-    Recovered64,
-    Recovered256,
-    Queries256,
-    LargeSplats,
-    LeftActive64,
-    LeftRecovered64,
-    ActiveFew,
-    RecoveredFew,
+passes! {
+    "project", LIBRARY;
+    CLEAR = "clear",
+    PROJECT = "project" needs INT64_ATOMICS,
+    PROJECT_32 = "project_32",
+    OCCUPANCY = "occupancy",
+    GRID = "grid",
+    COUNT = "count",
+    SCAN = "scan",
+    COMPACT = "compact",
+    GATHER = "gather",
+    SPLIT_COUNT = "split_count",
+    SPLIT = "split",
+    WORK = "work",
+}
+
+indices! {
+    /// Indirect dispatches whose number of workgroups depends on counters. A variant names the items and how many a
+    /// workgroup takes; `Blocks` are blocks of [`RANK_BLOCK_FLAGS`].
+    pub(crate) enum Work {
+        Visible256,
+        VisibleBlocks,
+        PassiveBlocks,
+        Active64,
+        Active256,
+        Recovered64,
+        Recovered256,
+        Queries256,
+        LargeSplats,
+        LeftActive64,
+        LeftRecovered64,
+        ActiveFew,
+        RecoveredFew,
+    }
 }
 
 impl Round {
+    /// The constant by which passes know the round.
+    pub(crate) fn constant(self) -> (&'static str, f64) {
+        ("ROUND", f64::from(self as u32))
+    }
+
     /// Dispatch with [`few`] queries per workgroup.
     pub(crate) fn work_few(self) -> Work {
         [Work::ActiveFew, Work::RecoveredFew][self as usize]
@@ -71,44 +86,60 @@ pub(crate) fn few(gpu: &Gpu) -> u32 {
     if gpu.is_software() { 16 } else { 4 }
 }
 
-/// Bytes of the arguments of an indirect dispatch.
-const WORK_BYTES: u64 = 12;
-/// Number of indirect dispatches.
-const WORK_COUNT: u64 = Work::RecoveredFew as u64 + 1;
-
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = 256;
-/// Flags that one workgroup ranks.
+/// Flags that one workgroup ranks: a block.
 pub(crate) const RANK_BLOCK_FLAGS: u32 = 2048;
 
-/// Indices into [`ScreenBuffers::counters`], in the order of `shared/counters.wgsl`.
-#[derive(Clone, Copy, Debug)]
-#[allow(dead_code, reason = "those that only the device uses have their place all the same")]
-pub(crate) enum Counter {
-    NotFinite,
-    Behind,
-    Outside,
-    Visible,
-    Blocks,
-    StripPx,
-    CellPx,
-    CellColumns,
-    Active,
-    Passive,
-    Recovered,
-    Clamped,
-    Bounded,
-    Outliers,
-    RangeLow,
-    RangeHigh,
-    Covered,
-    Large,
-    LeftActive,
-    LeftRecovered,
+indices! {
+    /// Counts and choices of the device: indices into [`ScreenBuffers::counters`].
+    pub(crate) enum Counter {
+        /// Points that cannot own a pixel, by reason.
+        NotFinite,
+        Behind,
+        Outside,
+        /// Screen points.
+        Visible,
+        /// Blocks of the screen that hold screen points.
+        Blocks,
+        /// Height of a strip of cells in pixels.
+        StripPx,
+        /// Side of a density cell in pixels.
+        CellPx,
+        /// Density cells per row.
+        CellColumns,
+        Active,
+        Passive,
+        Recovered,
+        /// Points with fewer than k neighbours because of a gap or the bound on work.
+        Clamped,
+        /// Points that reached the bound on work.
+        Bounded,
+        /// Discarded surfels.
+        Outliers,
+        /// Ends of the colour map, as bits of `f32`.
+        RangeLow,
+        RangeHigh,
+        /// Pixels that show a surface.
+        Covered,
+        /// Splats that are too large for one invocation.
+        Large,
+        /// Queries of each round that `search_four` leaves to `search`.
+        LeftActive,
+        LeftRecovered,
+    }
 }
 
 /// Length of [`ScreenBuffers::counters`].
-pub(crate) const COUNTERS: usize = Counter::LeftRecovered as usize + 1;
+pub(crate) const COUNTERS: usize = Counter::CONSTANTS.len();
+
+/// A cell of the density grid, laid out as in `shared/density.wgsl`.
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct DensityCell {
+    pub(crate) count: u32,
+    pub(crate) nearest: f32,
+}
 
 /// [`ScreenPoints`](super::ScreenPoints) on the device.
 #[derive(Debug)]
@@ -121,7 +152,7 @@ pub(crate) struct ScreenBuffers {
     /// One `u32` per [`Counter`].
     pub(crate) counters: wgpu::Buffer,
     keys: wgpu::Buffer,
-    /// Count and bits of the nearest depth, per density cell.
+    /// [`DensityCell`]s.
     pub(crate) density: wgpu::Buffer,
     /// Index of the first screen point of each cell.
     pub(crate) cell_start: wgpu::Buffer,
@@ -166,7 +197,7 @@ impl ScreenBuffers {
             counters: gpu.storage::<u32>("counters", COUNTERS)?,
             keys: gpu.storage::<[u32; 2]>("keys of pixels", slots)?,
             // Cells are two pixels wide at least.
-            density: gpu.storage::<[u32; 2]>("density grid", width.div_ceil(2) * height.div_ceil(2))?,
+            density: gpu.storage::<DensityCell>("density grid", width.div_ceil(2) * height.div_ceil(2))?,
             cell_start: gpu.storage::<u32>("starts of cells", pixels + 1)?,
             sixteenths: gpu.storage::<u32>("sixteenths of pixels", pixels.div_ceil(2))?,
             source: gpu.storage::<u32>("sources of screen points", capacity)?,
@@ -179,7 +210,7 @@ impl ScreenBuffers {
             block_sums: gpu.storage::<u32>("sums of blocks", slots.div_ceil(RANK_BLOCK_FLAGS as usize))?,
             arguments: gpu.buffer(
                 "arguments",
-                WORK_COUNT * WORK_BYTES,
+                Work::CONSTANTS.len() as u64 * DISPATCH_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
         })
@@ -187,7 +218,7 @@ impl ScreenBuffers {
 
     /// Number of workgroups of `work` that [`WorkPass`] computed last.
     pub(crate) fn groups(&self, work: Work) -> Groups {
-        Groups::Counted(self.arguments.clone(), work as u64 * WORK_BYTES)
+        Groups::Counted(self.arguments.clone(), work as u64 * DISPATCH_BYTES)
     }
 }
 
@@ -285,20 +316,19 @@ impl ProjectPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu, int64: bool) -> Result<Self, Error> {
-        let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
-        let reach = [("MARGIN_REACH", MARGIN_REACH.into())];
+        let pass = |source| Pass::new(gpu, source, &[]);
         Ok(Self {
             clear: pass(&CLEAR)?,
             nearest: NearestPass::new(gpu, int64)?,
-            occupancy: Pass::new(gpu, &OCCUPANCY, &[("MAX_SECOND_DEPTH_PX", MAX_SECOND_DEPTH_PX.into())])?,
-            grid: Pass::new(gpu, &GRID, &[("STRIP_SPACINGS", STRIP_SPACINGS.into())])?,
+            occupancy: pass(&OCCUPANCY)?,
+            grid: pass(&GRID)?,
             count: pass(&COUNT)?,
             scan_visible: scan_pass(gpu, Counter::Visible, None)?,
             compact: pass(&COMPACT)?,
             gather: pass(&GATHER)?,
-            split_count: Pass::new(gpu, &SPLIT_COUNT, &reach)?,
+            split_count: pass(&SPLIT_COUNT)?,
             scan_active: scan_pass(gpu, Counter::Active, Some(Counter::Visible))?,
-            split: Pass::new(gpu, &SPLIT, &reach)?,
+            split: pass(&SPLIT)?,
             work: WorkPass::new(gpu)?,
         })
     }
@@ -319,8 +349,9 @@ impl ProjectPasses {
         let mut steps =
             vec![self.clear.step(gpu, &[frame, keys, density, counters, sixteenths], slots.div_ceil(GROUP))];
         steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
-        let blocks_16 = width.div_ceil(16) * height.div_ceil(16);
-        steps.push(self.occupancy.step(gpu, &[frame, keys, counters], blocks_16));
+        const BLOCK_PX: u32 = cpu::OCCUPANCY_BLOCK_PX as u32;
+        let covered_blocks = width.div_ceil(BLOCK_PX) * height.div_ceil(BLOCK_PX);
+        steps.push(self.occupancy.step(gpu, &[frame, keys, counters], covered_blocks));
         steps.push(self.grid.step(gpu, &[frame, counters], 1));
         steps.push(self.count.step(gpu, &[frame, keys, counters, block_sums, density], slot_blocks));
         steps.push(self.scan_visible.step(gpu, &[frame, block_sums, counters], 1));

@@ -4,16 +4,12 @@
 // Differs from the paper: the paper divides by the whole screen, and its cells are too large for a small object.
 
 #import frame
-#import counters
 
 @group(0) @binding(1) var<storage, read_write> counters: array<u32>;
 
-// Height of a strip in mean distances between screen points: see the CPU form.
-override STRIP_SPACINGS: f32;
-
 @compute @workgroup_size(1)
 fn grid() {
-    let covered_px = f32(counters[BLOCKS] * 256u);
+    let covered_px = f32(counters[BLOCKS] * OCCUPANCY_BLOCK_PX * OCCUPANCY_BLOCK_PX);
     let spacing_px = sqrt(covered_px / f32(max(counters[VISIBLE], 1u)));
     counters[STRIP_PX] = clamp(u32(round(STRIP_SPACINGS * spacing_px)), 1u, 256u);
     let cell_px = max(u32(round(spacing_px * sqrt(f32(frame.k)))), 2u);

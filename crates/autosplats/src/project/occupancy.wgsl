@@ -1,35 +1,31 @@
-// Erases points far behind the other point of their pixel. Counts the screen points, and the blocks of 16 × 16 pixels
+// Erases points far behind the other point of their pixel. Counts the screen points, and the blocks of pixels
 // that hold any. These blocks are the covered part of the screen, whose density determines the sizes of cells.
 //
 // Reads and writes: keys. Writes: counters. One workgroup per block.
 
 #import frame
-#import groups
-#import counters
-#import keys
 #import divide
+#import groups
+#import keys
 
-@group(0) @binding(1) var<storage, read_write> keys: array<vec2u>;
+@group(0) @binding(1) var<storage, read_write> keys: array<Key>;
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
-
-// Largest depth, in widths of a pixel, of the second point of a pixel behind the first.
-override MAX_SECOND_DEPTH_PX: f32;
 
 var<workgroup> owned: atomic<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(OCCUPANCY_BLOCK_PX * OCCUPANCY_BLOCK_PX)
 fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         atomicStore(&owned, 0u);
     }
     workgroupBarrier();
-    let columns = (frame.size.x + 15u) / 16u;
+    let columns = (frame.size.x + OCCUPANCY_BLOCK_PX - 1u) / OCCUPANCY_BLOCK_PX;
     let block = divide(group_index(workgroup), columns);
-    let pixel = 16u * block.yx + vec2u(local % 16u, local / 16u);
+    let pixel = OCCUPANCY_BLOCK_PX * block.yx + vec2u(local % OCCUPANCY_BLOCK_PX, local / OCCUPANCY_BLOCK_PX);
     if all(pixel < frame.size) {
         let slot = (pixel.y * frame.size.x + pixel.x) << frame.halves;
-        var own = u32(keys[slot].x != EMPTY_KEY);
-        if frame.halves == 1u && keys[slot + 1u].x != EMPTY_KEY {
+        var own = u32(keys[slot].point != NO_POINT);
+        if frame.halves == 1u && keys[slot + 1u].point != NO_POINT {
             own += 1u;
             if own == 2u && erase_far(slot) {
                 own = 1u;
@@ -46,11 +42,11 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
 
 // Empties the slot of a pixel's farther point if it lies too far behind the nearer; returns whether it does.
 fn erase_far(slot: u32) -> bool {
-    let depth = vec2f(bitcast<f32>(keys[slot].y), bitcast<f32>(keys[slot + 1u].y));
+    let depth = vec2f(bitcast<f32>(keys[slot].depth), bitcast<f32>(keys[slot + 1u].depth));
     let near = min(depth.x, depth.y);
     if max(depth.x, depth.y) <= near + MAX_SECOND_DEPTH_PX * pixel_size(near) {
         return false;
     }
-    keys[slot + u32(depth.y > depth.x)] = vec2u(EMPTY_KEY);
+    keys[slot + u32(depth.y > depth.x)] = EMPTY_KEY;
     return true;
 }

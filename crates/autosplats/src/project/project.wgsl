@@ -3,12 +3,10 @@
 // Reads: a chunk of the cloud. Writes: keys, counters, sixteenths. `project_32` does the same with 32 bits.
 
 #import frame
-#import groups
-#import counters
-#import half
-#import project_point
-#import count_dropped
 #import add_sixteenth
+#import count_dropped
+#import groups
+#import project_point
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> positions: array<f32>;

@@ -2,23 +2,27 @@
 // the lowest index among the points at that depth. Both turns share one program, because two programs need not compute
 // the same bits: a depth that differed between them would leave a hole.
 //
-// Reads: a chunk of the cloud, turn. Writes: keys, as pairs of atomics; counters, sixteenths.
+// Reads: a chunk of the cloud, turn. Writes: keys, counters, sixteenths.
 
 #import frame
-#import groups
-#import counters
-#import half
-#import project_point
-#import count_dropped
 #import add_sixteenth
+#import count_dropped
+#import groups
+#import project_point
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> positions: array<f32>;
-@group(0) @binding(3) var<storage, read_write> keys: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read_write> keys: array<AtomicKey>;
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> sixteenths: array<atomic<u32>>;
 // 0 for depths, 1 for indices.
 @group(0) @binding(6) var<uniform> turn: u32;
+
+// As in `keys`, with atomics.
+struct AtomicKey {
+    point: atomic<u32>,
+    depth: atomic<u32>,
+}
 
 @compute @workgroup_size(256)
 fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -33,10 +37,10 @@ fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
                 count_dropped(projected.slot);
             }
         } else if turn == 0u {
-            atomicMin(&keys[2u * projected.slot + 1u], depth);
+            atomicMin(&keys[projected.slot].depth, depth);
             add_sixteenth(projected.sixteenths);
-        } else if atomicLoad(&keys[2u * projected.slot + 1u]) == depth {
-            atomicMin(&keys[2u * projected.slot], chunk.first + index);
+        } else if atomicLoad(&keys[projected.slot].depth) == depth {
+            atomicMin(&keys[projected.slot].point, chunk.first + index);
         }
     }
     count_dropped_finish(local);

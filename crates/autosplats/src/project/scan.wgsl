@@ -3,21 +3,20 @@
 // Reads and writes: block_sums, counters. One workgroup; each invocation takes a run of blocks.
 
 #import frame
-#import counters
 
 @group(0) @binding(1) var<storage, read_write> block_sums: array<u32>;
 @group(0) @binding(2) var<storage, read_write> counters: array<u32>;
 
 // Index of the counter that receives the total.
 override TOTAL: u32;
-// Index of the counter of items in blocks of 2048 that have sums. Equal to TOTAL if all blocks have sums.
+// Index of the counter of items in blocks that have sums. Equal to TOTAL if all blocks have sums.
 override SCANNED: u32;
 
 var<workgroup> before: array<u32, 257>;
 
 @compute @workgroup_size(256)
 fn scan(@builtin(local_invocation_index) local: u32) {
-    let blocks = select((counters[SCANNED] + 2047u) / 2048u, arrayLength(&block_sums), SCANNED == TOTAL);
+    let blocks = select((counters[SCANNED] + RANK_BLOCK_FLAGS - 1u) / RANK_BLOCK_FLAGS, arrayLength(&block_sums), SCANNED == TOTAL);
     let each = (blocks + 255u) / 256u;
     let first = min(local * each, blocks);
     let end = min(first + each, blocks);

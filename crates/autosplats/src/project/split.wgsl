@@ -3,17 +3,14 @@
 // Reads: points, density, block_sums. Writes: queries, passive, counters.
 
 #import frame
-#import picture
-#import groups
-#import counters
-#import rank
+#import active
 #import density
+#import groups
+#import rank
 #import screen
-#import matters
-#import culled
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read_write> counters: array<u32>;
 @group(0) @binding(4) var<storage, read> block_sums: array<u32>;
 @group(0) @binding(5) var<storage, read_write> queries: array<u32>;
@@ -24,23 +21,29 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     rank_clear(local);
     let block = group_index(workgroup);
     let visible = counters[VISIBLE];
-    var is_active = 0u;
-    for (var step = 0u; step < 8u; step++) {
+    let cell_px = counters[CELL_PX];
+    let cell_columns = counters[CELL_COLUMNS];
+    var active_steps = 0u;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
         let flag = step * 256u + local;
-        let index = block * 2048u + flag;
-        if index < visible && matters(points[index]) && !is_culled(points[index]) {
-            rank_set(flag);
-            is_active |= 1u << step;
+        let index = block * RANK_BLOCK_FLAGS + flag;
+        if index < visible {
+            let point = points[index];
+            let cell = density[density_cell(pixel_xy(point.pixel), cell_px, cell_columns)];
+            if is_active(point, cell, cell_px) {
+                rank_set(flag);
+                active_steps |= 1u << step;
+            }
         }
     }
     rank_finish(local);
     let active_before = block_sums[block];
-    for (var step = 0u; step < 8u; step++) {
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
         let flag = step * 256u + local;
-        let index = block * 2048u + flag;
+        let index = block * RANK_BLOCK_FLAGS + flag;
         let before = active_before + rank_of(flag);
         if index < visible {
-            if (is_active & (1u << step)) != 0u {
+            if (active_steps & (1u << step)) != 0u {
                 queries[before] = index;
             } else {
                 passive[index - before] = index;

@@ -1,18 +1,15 @@
-// Counts the active points of each block of 2048 screen points: points that matter and that grid culling keeps.
+// Counts the active points of each block of screen points: points that matter and that grid culling keeps.
 //
 // Reads: points, density, counters. Writes: block_sums.
 
 #import frame
-#import picture
-#import groups
-#import counters
+#import active
 #import density
+#import groups
 #import screen
-#import matters
-#import culled
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> counters: array<u32>;
 @group(0) @binding(4) var<storage, read_write> block_sums: array<u32>;
 
@@ -26,11 +23,17 @@ fn split_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     workgroupBarrier();
     let block = group_index(workgroup);
     let visible = counters[VISIBLE];
+    let cell_px = counters[CELL_PX];
+    let cell_columns = counters[CELL_COLUMNS];
     var own = 0u;
-    for (var step = 0u; step < 8u; step++) {
-        let index = block * 2048u + step * 256u + local;
-        if index < visible && matters(points[index]) && !is_culled(points[index]) {
-            own += 1u;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
+        let index = block * RANK_BLOCK_FLAGS + step * 256u + local;
+        if index < visible {
+            let point = points[index];
+            let cell = density[density_cell(pixel_xy(point.pixel), cell_px, cell_columns)];
+            if is_active(point, cell, cell_px) {
+                own += 1u;
+            }
         }
     }
     atomicAdd(&active_points, own);

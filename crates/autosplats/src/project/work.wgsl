@@ -3,27 +3,10 @@
 // Reads: counters. Writes: arguments. One invocation.
 
 #import frame
-#import groups
 #import put_work
-#import counters
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
-@group(0) @binding(2) var<storage, read_write> arguments: array<u32>;
-
-// Index of each dispatch in `arguments`. The number in a name is the items per workgroup; a block is 2048 flags.
-const VISIBLE256 = 0u;
-const VISIBLE_BLOCKS = 1u;
-const PASSIVE_BLOCKS = 2u;
-const ACTIVE64 = 3u;
-const ACTIVE256 = 4u;
-const RECOVERED64 = 5u;
-const RECOVERED256 = 6u;
-const QUERIES256 = 7u;
-const LARGE_SPLATS = 8u;
-const LEFT_ACTIVE64 = 9u;
-const LEFT_RECOVERED64 = 10u;
-const ACTIVE_FEW = 11u;
-const RECOVERED_FEW = 12u;
+@group(0) @binding(2) var<storage, read_write> arguments: array<Dispatch>;
 
 // Items that a workgroup processes together.
 override ITEMS_PER_GROUP: u32;
@@ -31,8 +14,8 @@ override ITEMS_PER_GROUP: u32;
 @compute @workgroup_size(1)
 fn work() {
     put_work(VISIBLE256, counters[VISIBLE], 256u);
-    put_work(VISIBLE_BLOCKS, counters[VISIBLE], 2048u);
-    put_work(PASSIVE_BLOCKS, counters[PASSIVE], 2048u);
+    put_work(VISIBLE_BLOCKS, counters[VISIBLE], RANK_BLOCK_FLAGS);
+    put_work(PASSIVE_BLOCKS, counters[PASSIVE], RANK_BLOCK_FLAGS);
     put_work(ACTIVE64, counters[ACTIVE], 64u);
     put_work(ACTIVE256, counters[ACTIVE], 256u);
     put_work(RECOVERED64, counters[RECOVERED], 64u);

@@ -7,9 +7,12 @@ use super::screen_grid::gpu::SearchPasses;
 use super::splat_communication::gpu::CommunicationPasses;
 use super::{SearchEngine, splat_communication};
 use crate::Error;
-use crate::gpu::{Gpu, Step};
+use crate::gpu::{File, Gpu, Step, files};
 use crate::project::DeviceCloud;
 use crate::project::gpu::{Round, ScreenBuffers};
+
+/// Files that the passes of several engines import.
+pub(crate) const IMPORTS: &[File] = files!["gaps", "window"];
 
 /// The buffers that an engine reads and writes.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +21,7 @@ pub(crate) struct SearchBuffers<'a> {
     pub(crate) frame: &'a wgpu::Buffer,
     pub(crate) cloud: &'a DeviceCloud,
     pub(crate) screen: &'a ScreenBuffers,
-    /// `Neighborhood` of `shared/surfel.wgsl` for each query, in query order.
+    /// `Neighborhood` of `shared/neighborhood.wgsl` for each query, in query order.
     pub(crate) neighborhoods: &'a wgpu::Buffer,
     /// Bits of a k-radius for each pixel of the last frame, 0 for none. Valid only if `frame` describes that frame.
     pub(crate) past: &'a wgpu::Buffer,

@@ -6,21 +6,39 @@ mod uniform;
 
 pub(crate) use finish::{ReadPicture, finish};
 pub(crate) use texture::check_texture;
+#[cfg(test)]
+pub(crate) use uniform::ShadePair;
 pub(crate) use uniform::{ShadeUniform, ShownQuantity, finds_range};
 
 use super::color_map::{self, table};
-use super::cpu::{BACK_COLOR, BACK_LIGHT, ENCODE_STEPS, background, encode_table, sample_step};
-use super::edges::INNER_NORMAL_PX;
-use super::{Background, ColorMap, Shading};
+use super::cpu::{self, ENCODE_STEPS, LUMINANCE, background, encode_table, sample_step};
+use super::light::{FILL, KEY};
+use super::{Background, ColorMap, Shading, edges, light, occlusion};
 use crate::Error;
-use crate::gpu::{Gpu, Pass, PassSource, Step};
+use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
+use crate::project::gpu::Counter;
 use crate::splat::LayerBuffers;
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[RANGE_VALUES, RANGE, SHADE];
-const RANGE_VALUES: PassSource = PassSource::new("shade/range_values", include_str!("range_values.wgsl"));
-const RANGE: PassSource = PassSource::new("shade/range", include_str!("range.wgsl"));
-const SHADE: PassSource = PassSource::new("shade/shade", include_str!("shade.wgsl"));
+/// Imports and constants of the passes.
+pub(super) const LIBRARY: Library = Library {
+    files: &[files!["shading", "srgb"]],
+    constants: &[
+        Counter::CONSTANTS,
+        ShownQuantity::CONSTANTS,
+        constants!(in cpu: BACK_COLOR, BACK_LIGHT, ENCODE_STEPS),
+        constants!(in edges: EDGE_SEARCH_PX, INNER_NORMAL_PX, MIN_TILT_LOSS),
+        constants!(in light: CLAY, FILL_LIGHT, GROUND, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY),
+        constants!(in occlusion: FARTHEST_RISE, MAX_FULL_RISE, MIN_RISE, PAIR_COUNT),
+        constants![FILL = FILL.to_array(), KEY = KEY.to_array(), LUMINANCE = LUMINANCE.to_array(), SHADE_GROUP],
+    ],
+};
+
+passes! {
+    "shade", LIBRARY;
+    RANGE_VALUES = "range_values",
+    RANGE = "range",
+    SHADE = "shade",
+}
 
 /// Invocations in a workgroup of `range_values`.
 const GROUP: u32 = 256;
@@ -123,13 +141,7 @@ struct ColoringPasses {
 impl ColoringPasses {
     fn new(gpu: &Gpu, shown: ShownQuantity, backs: bool) -> Result<Self, Error> {
         let shown = ("SHOWN", f64::from(shown as u32));
-        let shade = [
-            shown,
-            ("BACKS", backs.into()),
-            ("BACK_LIGHT", BACK_LIGHT.into()),
-            ("BACK_COLOR", BACK_COLOR.into()),
-            ("INNER_NORMAL_PX", INNER_NORMAL_PX as f64),
-        ];
+        let shade = [shown, ("BACKS", backs.into())];
         Ok(Self { range_values: Pass::new(gpu, &RANGE_VALUES, &[shown])?, shade: Pass::new(gpu, &SHADE, &shade)? })
     }
 }

@@ -7,7 +7,6 @@
 // show which byte follows.
 
 #import frame
-#import counters
 #import range_keys
 
 // Keys, padded with `NO_KEY` to a multiple of 1024 vectors.

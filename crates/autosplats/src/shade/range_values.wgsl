@@ -3,10 +3,10 @@
 // Reads: surface, cover, extras. Writes: keys.
 
 #import frame
-#import picture
 #import groups
-#import range_keys
 #import layers
+#import picture
+#import range_keys
 #import shading
 
 @group(0) @binding(2) var<storage, read> surface: array<vec4f>;

@@ -4,11 +4,10 @@
 // Reads: surface, cover, extras, counters, color_map, tables. Writes: image, linear.
 
 #import frame
-#import picture
-#import groups
 #import divide
-#import counters
+#import groups
 #import layers
+#import picture
 #import shading
 #import srgb
 
@@ -23,16 +22,8 @@
 @group(0) @binding(8) var<storage, read_write> image: array<u32>;
 @group(0) @binding(9) var<storage, read_write> linear: array<vec4f>;
 
-// Whether backs are toned; shares of light and of colour left on them.
+// Whether backs are toned.
 override BACKS: bool;
-override BACK_LIGHT: f32;
-override BACK_COLOR: f32;
-
-// Weights of red, green and blue in the brightness of a linear colour.
-const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
-
-// Distance from a border, in pixels, at which the inner depth and normal are read.
-override INNER_NORMAL_PX: i32;
 
 // The linear colour of a value. An unknown value gets the colour of the lower end; in a range without width every value
 // gets the middle colour.
@@ -59,7 +50,7 @@ fn base_color(pixel: vec2u, index: u32, surface_here: vec4f) -> vec3f {
     if SHOWN == SHOW_COLOR {
         return extras[index].rgb;
     }
-    return shading.clay;
+    return CLAY;
 }
 
 // The colour toned by the pixel's share of back.
@@ -72,17 +63,17 @@ fn tone_back(color: vec3f, index: u32) -> vec3f {
 }
 
 fn light(normal: vec3f) -> vec3f {
-    let key = max((dot(normal, shading.key) + shading.key_wrap) / (1.0 + shading.key_wrap), 0.0);
-    let fill = max(dot(normal, shading.fill), 0.0);
-    let around = shading.ground + (shading.sky - shading.ground) * (0.5 - 0.5 * normal.y);
-    let sum = shading.key_light * key + shading.fill_light * fill + around;
+    let key = max((dot(normal, KEY) + KEY_WRAP) / (1.0 + KEY_WRAP), 0.0);
+    let fill = max(dot(normal, FILL), 0.0);
+    let around = GROUND + (SKY - GROUND) * (0.5 - 0.5 * normal.y);
+    let sum = KEY_LIGHT * key + FILL_LIGHT * fill + around;
     return shading.given_light.x + shading.given_light.y * sum;
 }
 
 // A lit colour as shown, compressed above the shoulder.
 fn tone(color: vec3f) -> vec3f {
-    let above = max(color - shading.shoulder, vec3f(0.0)) / (1.0 - shading.shoulder);
-    return min(color, vec3f(shading.shoulder)) + (1.0 - shading.shoulder) * above / (1.0 + above);
+    let above = max(color - SHOULDER, vec3f(0.0)) / (1.0 - SHOULDER);
+    return min(color, vec3f(SHOULDER)) + (1.0 - SHOULDER) * above / (1.0 + above);
 }
 
 // Deeper than any surface. A finite number, because devices need not support infinity.
@@ -104,20 +95,19 @@ fn depth_at(pixel: vec2i) -> f32 {
 // Rise of the surface towards the eye from a depth to one beside it, as height by distance, limited as in
 // `occlusion.rs`.
 fn rise(depth: f32, there: f32, scale: f32) -> f32 {
-    let steepest = shading.steepest;
-    let slope = max((depth - there) * scale, -steepest);
-    return min(slope, max(steepest * steepest / max(slope, shading.least_rise), shading.furthest));
+    let slope = max((depth - there) * scale, -MAX_FULL_RISE);
+    return min(slope, max(MAX_FULL_RISE * MAX_FULL_RISE / max(slope, MIN_RISE), FARTHEST_RISE));
 }
 
 // Share of the light that a pair of pixels takes away.
 fn pair_occlusion(index: u32, pixel: vec2i, depth: f32, pixels_per_unit: f32) -> f32 {
     let pair = shading.pairs[index];
-    let step = vec2i(pair.xy);
-    let scale = pixels_per_unit * pair.z;
+    let step = vec2i(pair.step);
+    let scale = pixels_per_unit * pair.inverse_px;
     let a = rise(depth, depth_at(pixel + step), scale);
     let b = rise(depth, depth_at(pixel - step), scale);
     let cosine = (1.0 - a * b) * inverseSqrt((1.0 + a * a) * (1.0 + b * b));
-    return select(0.0, (1.0 - cosine) * 0.5 * pair.w, a + b > 0.0);
+    return select(0.0, (1.0 - cosine) * 0.5 * pair.part, a + b > 0.0);
 }
 
 // Light left by occlusion, 0 to 1.
@@ -165,7 +155,7 @@ fn outward_normal(pixel: vec2i, surface_here: vec4f, at_edge: bool) -> vec3f {
     }
     let inner = surface[screen_index(vec2u(inner_pixel))].xyz;
     let tilts = vec2f(outward) * mat2x2f(surface_here.xy, inner.xy);
-    return select(surface_here.xyz, inner, tilts.x < tilts.y - shading.less_tilted);
+    return select(surface_here.xyz, inner, tilts.x < tilts.y - MIN_TILT_LOSS);
 }
 
 // The colour of the surface at a pixel.
@@ -185,7 +175,7 @@ fn surface_color(pixel: vec2u, at_edge: bool) -> vec3f {
 // Distance to the end of a row of edges, and 1 if the row turns into the pixel's own row there.
 fn edge_end(pixel: vec2i, side: vec2i, kind: i32, along: vec2i) -> vec2i {
     var last = vec2f(depth_at(pixel), depth_at(pixel + side));
-    for (var distance = 1; distance <= shading.edge_search; distance++) {
+    for (var distance = 1; distance <= EDGE_SEARCH_PX; distance++) {
         let at = pixel + along * distance;
         if !is_inside(at) {
             // Beyond the picture the edge goes on.
@@ -199,7 +189,7 @@ fn edge_end(pixel: vec2i, side: vec2i, kind: i32, along: vec2i) -> vec2i {
         }
         last = next;
     }
-    return vec2i(shading.edge_search, 0);
+    return vec2i(EDGE_SEARCH_PX, 0);
 }
 
 // Part of a pixel that the border cuts off towards one of its ends.
@@ -226,11 +216,11 @@ fn part_of(side: vec2i, pixel: vec2i) -> f32 {
 // Word of a pixel of which `part` is covered in one colour and the rest is background.
 fn over(color: vec3f, part: f32, background: u32) -> u32 {
     if background == 0u {
-        return encode_color(color, shading.encode_steps) | (u32(part * 255.0 + 0.5) << 24u);
+        return encode_color(color, ENCODE_STEPS) | (u32(part * 255.0 + 0.5) << 24u);
     }
     let bytes = vec3f(vec3u(background, background >> 8u, background >> 16u) & vec3u(255u)) / 255.0;
     let behind = from_srgb(bytes);
-    return encode_color(behind + (color - behind) * part, shading.encode_steps) | 0xff000000u;
+    return encode_color(behind + (color - behind) * part, ENCODE_STEPS) | 0xff000000u;
 }
 
 fn put(pixel: vec2u, color: vec3f, rgba: u32) {
@@ -244,13 +234,13 @@ fn put(pixel: vec2u, color: vec3f, rgba: u32) {
     }
 }
 
-// A workgroup shades 32 by 8 pixels: whole cache lines of the image, and few rows of neighbours. An invocation shades
+// A workgroup shades SHADE_GROUP pixels: whole cache lines of the image, and few rows of neighbours. An invocation shades
 // four pixels, two rows apart.
 @compute @workgroup_size(32, 2)
 fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) local: vec3u) {
-    let columns = (frame.picture.x + 31u) / 32u;
+    let columns = (frame.picture.x + SHADE_GROUP.x - 1u) / SHADE_GROUP.x;
     let group = divide(group_index(workgroup), columns);
-    let first = group.yx * vec2u(32u, 8u) + local.xy;
+    let first = group.yx * SHADE_GROUP + local.xy;
     // Background first; bits mark the pixels that show more. A software device runs both sides of a branch, but a loop
     // only as often as needed. So little is computed in vain where nothing is covered.
     var shows = 0u;
@@ -297,7 +287,7 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
         }
         var rgba = tables[shading.backgrounds + pixel.y];
         if is_surface && (beside_is_surface || part == 0.0) {
-            rgba = encode_color(own + (beside - own) * part, shading.encode_steps) | 0xff000000u;
+            rgba = encode_color(own + (beside - own) * part, ENCODE_STEPS) | 0xff000000u;
         } else if is_surface {
             rgba = over(own, 1.0 - part, rgba);
         } else if beside_is_surface {

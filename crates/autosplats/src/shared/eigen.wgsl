@@ -1,7 +1,4 @@
-// Eigenvectors of symmetric 3×3 matrices by cyclic Jacobi rotations: see the CPU form. Imports: nothing.
-
-// Number of sweeps over the three entries off the diagonal.
-override SWEEPS: u32;
+// Eigenvectors of symmetric 3×3 matrices by cyclic Jacobi rotations: see the CPU form.
 
 struct Eigen {
     // Eigenvalues, ascending.
@@ -27,7 +24,7 @@ fn rotate(p: f32, q: f32, pq: f32, pr: f32, qr: f32, vector_p: vec3f, vector_q: 
     // tan of the smaller angle: sign(δ)·a/(|δ| + √(δ² + a²)). For a zero entry, the least divisor makes it 0.
     let length = sqrt(difference * difference + pq * pq);
     let signed = select(pq, -pq, difference < 0.0);
-    let tan = signed / max(abs(difference) + length, 1.1754943508222875e-38);
+    let tan = signed / max(abs(difference) + length, MIN_POSITIVE);
     let cos = 1.0 / sqrt(1.0 + tan * tan);
     let sin = tan * cos;
     return Rotated(

@@ -52,9 +52,6 @@ struct Frame {
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
-// Largest finite f32; WGSL has no literal for infinity.
-const MAX_F32 = 3.4028234663852886e38;
-const NO_POINT = 0xffffffffu;
 
 fn infinity() -> f32 {
     // A variable, because constant expressions must be finite.

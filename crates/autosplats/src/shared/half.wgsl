@@ -1,5 +1,6 @@
 // Halves of pixels, two per pixel, row by row. Halves lie side by side and one above the other in alternate pixels.
-// Imports: frame.
+
+#import frame
 
 // Half at a position in sixteenths of pixels: column and row.
 fn half_at(sixteenths: vec2u) -> u32 {

@@ -1,4 +1,7 @@
-// Moving surfels. Imports: frame, surfel.
+// Moving surfels.
+
+#import frame
+#import surfel
 
 // The surfel with another centre. Unchanged if that centre is off the screen, because depth refinement needs its pixel.
 fn moved(surfel: Surfel, center: vec3f) -> Surfel {

@@ -1,13 +1,27 @@
-// Noise of a frame's points. The including pass binds `measured`. See docs/decisions/0005-noise-level.md.
+// Noise of a frame's points. See docs/decisions/0005-noise-level.md.
 
-// Certainty that the measured scatter is noise and not structure, 0 to 1.
-fn noise_sure() -> f32 {
-    return measured[5];
+// Standard deviation of points from their surface.
+struct Noise {
+    // Noise level at k-radii of `most` and beyond, world units.
+    level: f32,
+    // Power of the k-radius that the noise grows with; 0 for uniform noise.
+    power: f32,
+    // K-radius up to which the noise grows, world units.
+    most: f32,
+    // Certainty that this is noise and not structure, 0 to 1.
+    sure: f32,
 }
 
-// Noise level in world units, the standard deviation of points from their surface, for points with this k-radius, above
-// 0.
-fn noise_at(k_radius: f32) -> f32 {
-    let power = measured[1];
-    return measured[0] * select(pow(min(k_radius / measured[4], 1.0), power), 1.0, power == 0.0);
+// Statistics of a frame's surfels.
+struct FrameStatistics {
+    noise: Noise,
+    // Median k-radius, world units; 0 if there are too few surfels.
+    k_radius: f32,
+    // Level of the cells that have sheets.
+    sheet_level: u32,
+}
+
+// Noise level of points with this k-radius, above 0, in world units.
+fn noise_at(noise: Noise, k_radius: f32) -> f32 {
+    return noise.level * select(pow(min(k_radius / noise.most, 1.0), noise.power), 1.0, noise.power == 0.0);
 }

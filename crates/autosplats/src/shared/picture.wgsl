@@ -1,4 +1,6 @@
-// The picture's part of the screen: the screen without the margin. Imports: frame.
+// The picture's part of the screen: the screen without the margin.
+
+#import frame
 
 // Index of a pixel of the picture in screen-sized buffers.
 fn screen_index(pixel: vec2u) -> u32 {

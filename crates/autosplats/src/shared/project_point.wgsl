@@ -1,4 +1,7 @@
-// Projection of a point [Paper, §3]. Imports: frame, half.
+// Projection of a point [Paper, §3].
+
+#import frame
+#import half
 
 // A run of the cloud's points, in a buffer of its own.
 struct Chunk {

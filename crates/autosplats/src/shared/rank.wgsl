@@ -1,7 +1,7 @@
 // Ranks of flags within a workgroup: the number of set flags before each. Deterministic and without a scan, because
 // flags are the bits of a few words.
 
-const RANK_WORDS = 64u;
+const RANK_WORDS = RANK_BLOCK_FLAGS / 32u;
 
 var<workgroup> rank_bits: array<atomic<u32>, RANK_WORDS>;
 // Number of set flags before each word.

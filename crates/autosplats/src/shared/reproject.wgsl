@@ -1,4 +1,6 @@
-// From this frame into the last one, of the same size: see the CPU form, `camera/reproject.rs`. Imports: frame.
+// From this frame into the last one, of the same size: see the CPU form, `camera/reproject.rs`.
+
+#import frame
 
 const NO_PIXEL = 0xffffffffu;
 

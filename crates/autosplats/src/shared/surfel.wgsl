@@ -1,19 +1,4 @@
-// Neighbourhoods and surfels: the results of search and fit.
-
-// Sums over a point's neighbours, relative to the point itself, which is not counted.
-struct Neighborhood {
-    // Σ(q - p), view space.
-    offset: vec3f,
-    // Number of neighbours; 0 if the point is an outlier.
-    count: f32,
-    // Σ(q - p)(q - p)ᵀ: xx, xy, xz.
-    second_x: vec3f,
-    // Distance to the furthest neighbour, world units.
-    k_radius: f32,
-    // yy, yz, zz.
-    second_yz: vec3f,
-    padding: u32,
-}
+// Surfels: the results of the fit.
 
 // An oriented disc in view space.
 struct Surfel {
@@ -37,11 +22,6 @@ struct Surfel {
     // Index among the screen points, below 2³⁰, and the flags BACK and LINE.
     screen_and_flags: u32,
 }
-
-// The eye sees the side that the point's sensor did not see.
-const BACK = 0x80000000u;
-// The neighbourhood is a line, which has no width to draw.
-const LINE = 0x40000000u;
 
 // Index among the screen points.
 fn screen_of(surfel: Surfel) -> u32 {

@@ -4,7 +4,6 @@
 
 #import frame
 #import groups
-#import counters
 #import screen
 #import splat
 
@@ -12,9 +11,6 @@
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
 @group(0) @binding(3) var<storage, read> tree: array<vec2u>;
 @group(0) @binding(4) var<storage, read_write> centers: array<atomic<u32>>;
-
-// Steps along the side of a pixel.
-override CENTER_STEPS: f32;
 
 @compute @workgroup_size(256)
 fn add_centers(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {

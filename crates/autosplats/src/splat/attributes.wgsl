@@ -4,12 +4,12 @@
 // Reads: linear, splats, tree, surfels, values, depth_map. Writes: surface, cover, extras.
 
 #import frame
-#import groups
-#import surfel
-#import splat
-#import patch
-#import layers
 #import depth_map
+#import groups
+#import layers
+#import patch
+#import splat
+#import surfel
 
 // Linear value of each 8-bit step of a colour.
 @group(0) @binding(1) var<uniform> linear: array<vec4f, 64>;
@@ -32,14 +32,10 @@ override COLOR_SLOTS: u32;
 override SCALAR_SLOTS: u32;
 override MEASURE_SLOTS: u32;
 override BACK_SLOTS: u32;
-// Slope of the kernel.
-override KERNEL_SLOPE: f32;
-override CORE_WEIGHT: f32;
-override INNER_WEIGHT: f32;
 
-var<workgroup> normals: array<vec3f, GROUP>;
-var<workgroup> sources: array<u32, GROUP>;
-var<workgroup> reaches: array<f32, GROUP>;
+var<workgroup> normals: array<vec3f, BATCH>;
+var<workgroup> sources: array<u32, BATCH>;
+var<workgroup> reaches: array<f32, BATCH>;
 var<workgroup> colors: array<vec3f, COLOR_SLOTS>;
 // Value (x) and weight (y), which is 0 for an unknown value.
 var<workgroup> scalars: array<vec2f, SCALAR_SLOTS>;
@@ -169,7 +165,7 @@ fn add(sums: ptr<private, Sums>, hit: Fragments, carried: Carried) {
     (*sums).reach = select((*sums).reach, vec4f(carried.reach), heavier);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(BATCH)
 fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let index = group_index(workgroup);
     if index >= patches().x * patches().y {

@@ -4,7 +4,6 @@
 
 #import frame
 #import groups
-#import counters
 #import splat
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;

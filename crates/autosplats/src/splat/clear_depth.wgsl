@@ -3,8 +3,8 @@
 // Writes: depth_map.
 
 #import frame
-#import groups
 #import depth_map
+#import groups
 
 @group(0) @binding(1) var<storage, read_write> depth_map: array<u32>;
 

@@ -4,11 +4,9 @@
 // Reads: counters, splats, tree. Reads and writes: depth_map.
 
 #import frame
-#import groups
-#import counters
-#import splat
-#import depth_map
 #import fragment
+#import groups
+#import splat
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;

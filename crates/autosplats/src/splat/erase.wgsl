@@ -4,13 +4,11 @@
 // Reads: counters, splats, tree, changes. Reads and writes: depth_map, cells.
 
 #import frame
-#import groups
-#import counters
-#import splat
-#import depth_map
-#import fragment
-#import redraw
 #import erased
+#import fragment
+#import groups
+#import redraw
+#import splat
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;

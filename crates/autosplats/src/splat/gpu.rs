@@ -4,70 +4,87 @@
 //! The depth map takes minima, which do not depend on the order. An invocation draws a splat, a workgroup draws a large
 //! one, by atomic minima of integers that order as depths do. Few splats die in a refinement, and most of them were
 //! hidden. So refinement erases their depths from the map, and redraws only splats that meet a cell of 8×8 pixels with
-//! erased depths (`shared/redraw.wgsl`).
+//! erased depths (`imports/redraw.wgsl`).
 //!
 //! Attributes are sums, which have to equal those of the CPU and be the same each time. So a pixel draws its splats in
 //! list order. A workgroup per patch of 16×32 pixels finds them by a tree over the list instead of bins
-//! (`shared/splat.wgsl`, `shared/patch.wgsl`). The centres for trimming are counted in integers, again independent of
+//! (`imports/splat.wgsl`, `imports/patch.wgsl`). The centres for trimming are counted in integers, again independent of
 //! the order.
 
-use super::centers::CENTER_STEPS;
 use super::layers::{Channels, LayerBuffers};
-use super::raster::KERNEL_SLOPE;
-use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, MAX_AXIS_PER_DEPTH, MIN_FACING_COSINE, RECOVER_DISTANCE_RADII};
-use super::trim::blurred::{
-    BLOCK_PX, BLOCKS_BEYOND_FRINGE, BLURRING_NOISE_SHARE, FRINGE_NOISES, FULL_NOISE_SINE, HALF_WAY_OFFSET_SHARE,
-    MAX_BLURRED_OFFSET, MAX_PIXEL_WINDOW_PX, MAX_WINDOW_PX, MIN_BLURRING_NOISE_PX, MIN_WINDOW_PX,
-    MIN_WINDOW_SIXTEENTHS, SPREAD_WEIGHT, SURE_NOISE_DISTANCES, SURE_NOISE_PX, WINDOW_PER_KERNEL_VARIANCE,
-    WINDOW_PER_NOISE_VARIANCE,
-};
-use super::trim::{
-    CORE_WEIGHT, DECISIVE_SIXTEENTHS, EXTRA_STRIDES, FINE_DIRECTION_SIXTEENTHS, INNER_WEIGHT, LINE_LENGTH_REACHES,
-    MAX_ALIGNED_STRIDE_PX, MAX_NARROW_REACH_PX, MAX_SPLAT_MEAN_OFFSET_PX, MIN_SIXTEENTHS, MIN_SPLATS,
-    SIDE_SHARE_DIVISOR, SPLAT_WINDOW_PX, STRIDES_PER_REACH,
-};
+use super::trim::blurred::{self, BLOCK_PX};
+use super::trim::{self, ACROSS, LINES, OWN_SIXTEENTHS};
+use super::{centers, raster, setup};
 use crate::Error;
-use crate::adapt::gpu::NOISE_FLOATS;
-use crate::fit::SUPPORT;
-use crate::gpu::{Gpu, Pass, PassSource, Step};
+use crate::adapt::FrameStatistics;
+use crate::fit::{SUPPORT, Surfel};
+use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
 use crate::project::MARGIN_REACH;
-use crate::project::gpu::{Counter, Round, ScreenBuffers, Work, WorkPass, scan_pass};
+use crate::project::gpu::{Counter, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, WorkPass, scan_pass};
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[
-    SET_UP,
-    BOXES,
-    CLEAR_DEPTH,
-    DEPTH,
-    DEPTH_LARGE,
-    RECOVER_COUNT,
-    RECOVER,
-    CLEAR_WORDS,
-    REFINE,
-    ERASE,
-    ERASE_LARGE,
-    REDRAW,
-    ATTRIBUTES,
-    ADD_CENTERS,
-    SUM_BLOCKS,
-    TRIM,
-];
-const SET_UP: PassSource = PassSource::new("splat/set_up", include_str!("set_up.wgsl"));
-const BOXES: PassSource = PassSource::new("splat/boxes", include_str!("boxes.wgsl"));
-const CLEAR_DEPTH: PassSource = PassSource::new("splat/clear_depth", include_str!("clear_depth.wgsl"));
-const DEPTH_LARGE: PassSource = PassSource::new("splat/depth_large", include_str!("depth_large.wgsl"));
-const DEPTH: PassSource = PassSource::new("splat/depth", include_str!("depth.wgsl"));
-const RECOVER_COUNT: PassSource = PassSource::new("splat/recover_count", include_str!("recover_count.wgsl"));
-const RECOVER: PassSource = PassSource::new("splat/recover", include_str!("recover.wgsl"));
-pub(super) const CLEAR_WORDS: PassSource = PassSource::new("splat/clear_words", include_str!("clear_words.wgsl"));
-const REFINE: PassSource = PassSource::new("splat/refine", include_str!("refine.wgsl"));
-const ERASE: PassSource = PassSource::new("splat/erase", include_str!("erase.wgsl"));
-const ERASE_LARGE: PassSource = PassSource::new("splat/erase_large", include_str!("erase_large.wgsl"));
-const REDRAW: PassSource = PassSource::new("splat/redraw", include_str!("redraw.wgsl"));
-const ATTRIBUTES: PassSource = PassSource::new("splat/attributes", include_str!("attributes.wgsl"));
-const ADD_CENTERS: PassSource = PassSource::new("splat/add_centers", include_str!("add_centers.wgsl"));
-const SUM_BLOCKS: PassSource = PassSource::new("splat/sum_blocks", include_str!("sum_blocks.wgsl"));
-const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: &[files![
+        "blocks",
+        "blurred",
+        "depth_map",
+        "erased",
+        "fragment",
+        "hidden",
+        "marked",
+        "patch",
+        "recovered",
+        "redraw",
+        "splat",
+    ]],
+    constants: &[
+        Counter::CONSTANTS,
+        constants!(in blurred:
+            BLOCK_PX, BLOCKS_BEYOND_FRINGE, BLURRING_NOISE_SHARE, FRINGE_BLOCKS, FRINGE_NOISES, FULL_NOISE_SINE,
+            HALF_WAY_OFFSET_SHARE, MAX_BLURRED_OFFSET, MAX_PIXEL_WINDOW_PX, MAX_WINDOW_PX, MIN_BLURRING_NOISE_PX,
+            MIN_WINDOW_PX, MIN_WINDOW_SIXTEENTHS, SPREAD_WEIGHT, SURE_NOISE_DISTANCES, SURE_NOISE_PX,
+            WINDOW_PER_KERNEL_VARIANCE, WINDOW_PER_NOISE_VARIANCE
+        ),
+        constants!(in Surfel: BACK, LINE),
+        constants!(in centers: CENTER_STEPS),
+        constants!(in raster: KERNEL_SLOPE),
+        constants!(in setup:
+            DOT_RADIUS_PX, EPSILON_RADII, MAX_AXIS_PER_DEPTH, MIN_FACING_COSINE, RECOVER_DISTANCE_RADII
+        ),
+        constants!(in trim:
+            ACROSS, CORE_WEIGHT, DECISIVE_SIXTEENTHS, FINE_DIRECTION_SIXTEENTHS, INNER_WEIGHT, LINE_LENGTH_REACHES,
+            MARGIN, MAX_ALIGNED_STRIDE_PX, MAX_NARROW_REACH_PX, MAX_SPLAT_MEAN_OFFSET_PX, MIN_SIXTEENTHS, MIN_SPLATS,
+            SIDE_SHARE_DIVISOR, SPLAT_WINDOW_PX, STRIDES_PER_REACH
+        ),
+        constants![
+            DIRECTIONS = ACROSS.len(),
+            EXTRA_STRIDES = trim::EXTRA_STRIDES as i32,
+            LINES = LINES.len(),
+            OWN_SIXTEENTHS = [OWN_SIXTEENTHS as u32, (OWN_SIXTEENTHS >> 32) as u32],
+        ],
+        constants![BATCH, CELL_BITS, FAN, FAN_BITS, MARGIN_REACH, PATCH, RANK_BLOCK_FLAGS, SQUARE, SUPPORT, TOP_NODES],
+    ],
+};
+
+passes! {
+    "splat", LIBRARY;
+    SET_UP = "set_up",
+    BOXES = "boxes",
+    CLEAR_DEPTH = "clear_depth",
+    DEPTH = "depth",
+    DEPTH_LARGE = "depth_large",
+    RECOVER_COUNT = "recover_count",
+    RECOVER = "recover",
+    pub(super) CLEAR_WORDS = "clear_words",
+    REFINE = "refine",
+    ERASE = "erase",
+    ERASE_LARGE = "erase_large",
+    REDRAW = "redraw",
+    ATTRIBUTES = "attributes",
+    ADD_CENTERS = "add_centers",
+    SUM_BLOCKS = "sum_blocks",
+    TRIM = "trim",
+}
 
 /// Most pixels of a splat's bounds that one invocation draws. On hardware the other invocations of its group wait for
 /// it; on a software device, the second value, a workgroup costs more.
@@ -77,13 +94,20 @@ const PATCH: [u32; 2] = [16, 32];
 const BATCH: u32 = 64;
 /// Side in pixels of the square that a workgroup trims.
 const SQUARE: u32 = 32;
-/// Side in pixels of a cell that refinement marks.
-const CELL: u32 = 8;
-/// Splats below each top node of the tree, and nodes there (`shared/splat.wgsl`).
-const TOP_SPLATS: u32 = 4096;
-const TOP_NODES: u32 = 1 + 16 + 256 + 4096;
+/// Binary logarithm of the side in pixels of a cell, which is marked if depths in it were erased.
+const CELL_BITS: u32 = 3;
+/// Children of a node of the tree, and their binary logarithm.
+const FAN: u32 = 1 << FAN_BITS;
+const FAN_BITS: u32 = 4;
+/// Splats below each top node of the tree, and nodes there.
+const TOP_SPLATS: u32 = FAN * FAN * FAN;
+const TOP_NODES: u32 = 1 + FAN + FAN * FAN + FAN * FAN * FAN;
 /// Bytes of a splat.
 const SPLAT_BYTES: usize = 48;
+
+/// Structs of WGSL with their sizes here.
+#[cfg(test)]
+pub(crate) const SIZES: &[(&str, usize)] = &[("Splat", SPLAT_BYTES)];
 
 /// Options of drawing the layers.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +116,7 @@ pub(crate) struct LayerRules<'a> {
     pub(crate) depth_refinement: bool,
     /// Trim the layers in the end.
     pub(crate) trim: bool,
-    /// Noise of the frame in the layout of `shared/noise.wgsl`; `None` if it is not measured.
+    /// [`FrameStatistics`] with the noise; `None` if it is not measured.
     pub(crate) noise: Option<&'a wgpu::Buffer>,
 }
 
@@ -103,14 +127,14 @@ pub(crate) struct SplatBuffers {
     tree: wgpu::Buffer,
     /// Indices of splats too large for one invocation.
     large: wgpu::Buffer,
-    /// Depth per pixel, pushed back by ε, row by row, as `shared/depth_map.wgsl` has it; infinite where nothing is.
+    /// Depth per pixel, pushed back by ε, row by row, as `imports/depth_map.wgsl` has it; infinite where nothing is.
     pub(crate) depth: wgpu::Buffer,
-    /// Change of each splat in the last refinement, and the marks of cells with erased depths (`shared/redraw.wgsl`).
+    /// Change of each splat in the last refinement, and the marks of cells with erased depths (`imports/redraw.wgsl`).
     changes: wgpu::Buffer,
     cells: wgpu::Buffer,
     /// Centres of splats in each pixel, row by row (`centers.rs`).
     centers: wgpu::Buffer,
-    /// Blocks of pixels, row by row (`shared/blocks.wgsl`).
+    /// Blocks of pixels, row by row (`imports/blocks.wgsl`).
     blocks: wgpu::Buffer,
     /// Zeros for frames whose noise is not measured.
     no_noise: wgpu::Buffer,
@@ -133,7 +157,7 @@ impl SplatBuffers {
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
             centers: gpu.storage::<u32>("centres of splats", pixels)?,
             blocks: gpu.storage::<u32>("blocks of pixels", block_count(size) as usize)?,
-            no_noise: gpu.storage::<f32>("no noise", NOISE_FLOATS)?,
+            no_noise: gpu.storage::<FrameStatistics>("no noise", 1)?,
         })
     }
 }
@@ -174,30 +198,16 @@ impl SplatPasses {
     /// # Errors
     /// [`Error::Device`], [`Error::DeviceMemory`].
     pub(crate) fn new(gpu: &Gpu, channels: Channels, linear: &[f32; 256]) -> Result<Self, Error> {
-        let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
+        let pass = |source| Pass::new(gpu, source, &[]);
         let most_px = ("MAX_INVOCATION_PX", MAX_INVOCATION_PX[usize::from(gpu.is_software())].into());
-        let dot_radius = ("DOT_RADIUS_PX", f64::from(DOT_RADIUS_PX));
-        let set_up = |recovered: f64| {
-            let constants = [
-                ("RECOVERED_ONLY", recovered),
-                most_px,
-                dot_radius,
-                ("SUPPORT", SUPPORT.into()),
-                ("MIN_FACING_COSINE", MIN_FACING_COSINE.into()),
-                ("EPSILON_RADII", EPSILON_RADII.into()),
-                ("MAX_AXIS_PER_DEPTH", MAX_AXIS_PER_DEPTH.into()),
-            ];
-            Pass::new(gpu, &SET_UP, &constants)
-        };
-        let depth = |recovered: f64| Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), dot_radius, most_px]);
+        let set_up = |recovered: f64| Pass::new(gpu, &SET_UP, &[("RECOVERED_ONLY", recovered), most_px]);
+        let depth = |recovered: f64| Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), most_px]);
         let depth_large = |recovered: f64, redrawn: f64| {
-            let constants = [("RECOVERED_ONLY", recovered), ("REDRAWN_ONLY", redrawn), dot_radius];
-            Pass::new(gpu, &DEPTH_LARGE, &constants)
+            Pass::new(gpu, &DEPTH_LARGE, &[("RECOVERED_ONLY", recovered), ("REDRAWN_ONLY", redrawn)])
         };
         let Channels { color, scalar, measures, backs } = channels;
         let slots = |carried: bool| if carried { f64::from(BATCH) } else { 1.0 };
         let attributes = [
-            dot_radius,
             ("COLOR", color.into()),
             ("SCALAR", scalar.into()),
             ("MEASURES", measures.into()),
@@ -206,50 +216,8 @@ impl SplatPasses {
             ("SCALAR_SLOTS", slots(scalar)),
             ("MEASURE_SLOTS", slots(measures)),
             ("BACK_SLOTS", slots(backs)),
-            ("KERNEL_SLOPE", KERNEL_SLOPE.into()),
-            ("CORE_WEIGHT", CORE_WEIGHT.into()),
-            ("INNER_WEIGHT", INNER_WEIGHT.into()),
         ];
-        let trim = |trims: f64| {
-            let constants = [
-                ("TRIMS", trims),
-                ("LINE_LENGTH_REACHES", LINE_LENGTH_REACHES.into()),
-                ("STRIDES_PER_REACH", STRIDES_PER_REACH.into()),
-                ("EXTRA_STRIDES", EXTRA_STRIDES as f64),
-                ("MAX_ALIGNED_STRIDE_PX", MAX_ALIGNED_STRIDE_PX as f64),
-                ("SIDE_SHARE_DIVISOR", SIDE_SHARE_DIVISOR.into()),
-                ("MIN_SIXTEENTHS_NARROW", MIN_SIXTEENTHS[0].into()),
-                ("MIN_SIXTEENTHS_WIDE", MIN_SIXTEENTHS[1].into()),
-                ("DECISIVE_SIXTEENTHS", DECISIVE_SIXTEENTHS.into()),
-                ("FINE_DIRECTION_SIXTEENTHS", FINE_DIRECTION_SIXTEENTHS.into()),
-                ("SPLAT_WINDOW_PX", SPLAT_WINDOW_PX.into()),
-                ("MAX_SPLAT_MEAN_OFFSET_PX", MAX_SPLAT_MEAN_OFFSET_PX.into()),
-                ("MIN_SPLATS_NARROW", MIN_SPLATS[0].into()),
-                ("MIN_SPLATS_WIDE", MIN_SPLATS[1].into()),
-                ("MAX_NARROW_REACH_PX", MAX_NARROW_REACH_PX.into()),
-                ("CENTER_STEPS", CENTER_STEPS.into()),
-                ("MIN_BLURRING_NOISE_PX", MIN_BLURRING_NOISE_PX.into()),
-                ("MIN_WINDOW_PX", MIN_WINDOW_PX.into()),
-                ("WINDOW_PER_KERNEL_VARIANCE", WINDOW_PER_KERNEL_VARIANCE.into()),
-                ("WINDOW_PER_NOISE_VARIANCE", WINDOW_PER_NOISE_VARIANCE.into()),
-                ("FULL_NOISE_SINE", FULL_NOISE_SINE.into()),
-                ("BLURRING_NOISE_SHARE", BLURRING_NOISE_SHARE.into()),
-                ("MAX_WINDOW_PX", MAX_WINDOW_PX.into()),
-                ("MAX_PIXEL_WINDOW_PX", MAX_PIXEL_WINDOW_PX.into()),
-                ("SPREAD_WEIGHT", SPREAD_WEIGHT.into()),
-                ("MAX_OFFSET_UNSURE", MAX_BLURRED_OFFSET[0].into()),
-                ("MAX_OFFSET_SURE", MAX_BLURRED_OFFSET[1].into()),
-                ("SURE_NOISE_PX", SURE_NOISE_PX.into()),
-                ("SURE_NOISE_DISTANCES", SURE_NOISE_DISTANCES.into()),
-                ("MIN_WINDOW_SIXTEENTHS", MIN_WINDOW_SIXTEENTHS.into()),
-                ("FRINGE_NOISES", FRINGE_NOISES.into()),
-                ("BLOCKS_BEYOND_FRINGE", BLOCKS_BEYOND_FRINGE.into()),
-                ("HALF_WAY_OFFSET_SHARE", HALF_WAY_OFFSET_SHARE.into()),
-                ("SUPPORT", SUPPORT.into()),
-            ];
-            Pass::new(gpu, &TRIM, &constants)
-        };
-        let reach = [("RECOVER_DISTANCE_RADII", RECOVER_DISTANCE_RADII.into()), ("MARGIN_REACH", MARGIN_REACH.into())];
+        let trim = |trims: f64| Pass::new(gpu, &TRIM, &[("TRIMS", trims)]);
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
         Ok(Self {
@@ -259,17 +227,17 @@ impl SplatPasses {
             depth: [depth(0.0)?, depth(1.0)?],
             depth_large: [depth_large(0.0, 0.0)?, depth_large(1.0, 0.0)?],
             redraw_large: depth_large(0.0, 1.0)?,
-            recover_count: Pass::new(gpu, &RECOVER_COUNT, &reach)?,
+            recover_count: pass(&RECOVER_COUNT)?,
             scan_recovered: scan_pass(gpu, Counter::Recovered, Some(Counter::Passive))?,
             recover: pass(&RECOVER)?,
             work: WorkPass::new(gpu)?,
             clear_words: pass(&CLEAR_WORDS)?,
             refine: pass(&REFINE)?,
-            erase: Pass::new(gpu, &ERASE, &[dot_radius, most_px])?,
-            erase_large: Pass::new(gpu, &ERASE_LARGE, &[dot_radius])?,
-            redraw: Pass::new(gpu, &REDRAW, &[dot_radius, most_px])?,
+            erase: Pass::new(gpu, &ERASE, &[most_px])?,
+            erase_large: pass(&ERASE_LARGE)?,
+            redraw: Pass::new(gpu, &REDRAW, &[most_px])?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
-            add_centers: Pass::new(gpu, &ADD_CENTERS, &[("CENTER_STEPS", CENTER_STEPS.into())])?,
+            add_centers: pass(&ADD_CENTERS)?,
             sum_blocks: pass(&SUM_BLOCKS)?,
             trim: [trim(0.0)?, trim(1.0)?],
             linear: steps,
@@ -392,7 +360,7 @@ fn tops(screen: &ScreenBuffers) -> u32 {
 
 /// Cells in a picture of this size, with one more column and row.
 fn cells([columns, rows]: [u32; 2]) -> u32 {
-    (columns / CELL + 1) * (rows / CELL + 1)
+    ((columns >> CELL_BITS) + 1) * ((rows >> CELL_BITS) + 1)
 }
 
 /// Blocks of pixels in a picture of this size.

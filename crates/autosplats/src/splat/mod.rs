@@ -31,8 +31,6 @@ pub(crate) use layers::{Channels, LayerBuffers};
 pub(crate) use layers::{Cover, upload_layers};
 pub(crate) use over_time::{OverTime, STEADY_FRAMES};
 pub(crate) use trim::TrimRules;
-#[cfg(test)]
-pub(crate) use trim::blurred::{BLOCK_PX, FRINGE_BLOCKS};
 
 /// Side of a screen tile in pixels: the unit of splatting, and the layout of every screen-sized layer.
 pub const TILE: usize = 64;

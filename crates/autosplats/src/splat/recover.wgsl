@@ -4,7 +4,6 @@
 
 #import frame
 #import groups
-#import counters
 #import rank
 #import recovered
 
@@ -18,19 +17,19 @@ fn recover(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     rank_clear(local);
     let block = group_index(workgroup);
     var is_recovered = 0u;
-    for (var step = 0u; step < 8u; step++) {
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
         let flag = step * 256u + local;
-        let index = block * 2048u + flag;
+        let index = block * RANK_BLOCK_FLAGS + flag;
         if index < counters[PASSIVE] && (passive[index] & RECOVERED_FLAG) != 0u {
             rank_set(flag);
             is_recovered |= 1u << step;
         }
     }
     rank_finish(local);
-    for (var step = 0u; step < 8u; step++) {
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
         let flag = step * 256u + local;
         if (is_recovered & (1u << step)) != 0u {
-            queries[counters[ACTIVE] + block_sums[block] + rank_of(flag)] = passive[block * 2048u + flag] & ~RECOVERED_FLAG;
+            queries[counters[ACTIVE] + block_sums[block] + rank_of(flag)] = passive[block * RANK_BLOCK_FLAGS + flag] & ~RECOVERED_FLAG;
         }
     }
 }

@@ -4,12 +4,9 @@
 
 #import frame
 #import groups
-#import counters
-#import screen
-#import depth_map
 #import hidden
-#import splat
 #import redraw
+#import splat
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;

@@ -4,9 +4,8 @@
 
 #import frame
 #import groups
-#import counters
-#import surfel
 #import splat
+#import surfel
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
@@ -19,11 +18,6 @@
 override RECOVERED_ONLY: bool;
 // Most pixels of a splat's bounds that one invocation draws.
 override MAX_INVOCATION_PX: u32;
-override DOT_RADIUS_PX: f32;
-override SUPPORT: f32;
-override MIN_FACING_COSINE: f32;
-override EPSILON_RADII: f32;
-override MAX_AXIS_PER_DEPTH: f32;
 
 // Empty bounds: the first pixel lies beyond all, the last is 0.
 const NOWHERE = 0x7fffu;

@@ -1,24 +1,25 @@
 // Counts the sixteenths with points in each block of pixels, and marks empty blocks; only in frames with noise. An
 // invocation per block.
 //
-// Reads: cover, sixteenths, measured. Writes: blocks.
+// Reads: cover, sixteenths, statistics. Writes: blocks.
 
 #import frame
-#import picture
+#import blocks
 #import groups
 #import layers
-#import blocks
+#import noise
+#import picture
 
 @group(0) @binding(1) var<storage, read> cover: array<Cover>;
 @group(0) @binding(2) var<storage, read> sixteenths: array<u32>;
-@group(0) @binding(3) var<storage, read> measured: array<f32>;
+@group(0) @binding(3) var<storage, read> statistics: FrameStatistics;
 @group(0) @binding(4) var<storage, read_write> blocks: array<u32>;
 
 @compute @workgroup_size(64)
 fn sum_blocks(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let at = group_index(workgroup) * 64u + local;
     let all = block_counts();
-    if !(measured[0] > 0.0) || at >= all.x * all.y {
+    if !(statistics.noise.level > 0.0) || at >= all.x * all.y {
         return;
     }
     let first = BLOCK_PX * vec2u(at % all.x, at / all.x);

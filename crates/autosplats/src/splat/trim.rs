@@ -76,13 +76,13 @@ const BORDER_DISTANCE_PX: usize = 3;
 /// corners. Only points decide there, and only if an empty pixel lies within this distance on their open side.
 const GAP_DISTANCE_PX: usize = 2;
 /// Pixels around a tile that its border tests read.
-const MARGIN: usize = BORDER_DISTANCE_PX + 1;
+pub(super) const MARGIN: usize = BORDER_DISTANCE_PX + 1;
 const _: () = assert!(TILE == 64, "a row of a tile is a word");
 /// Directions of the eight lines, in pixels.
-const LINES: [[isize; 2]; 8] = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
+pub(super) const LINES: [[isize; 2]; 8] = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
 /// Directions across which borders are tested: those of the lines, then those between them.
 #[rustfmt::skip]
-const ACROSS: [[isize; 2]; 2 * LINES.len()] = [
+pub(super) const ACROSS: [[isize; 2]; 2 * LINES.len()] = [
     [1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2],
     [4, 1], [1, 4], [4, -1], [1, -4], [4, 3], [3, 4], [4, -3], [3, -4],
 ];
@@ -111,7 +111,7 @@ const QUARTERS: [u64; 4] =
     [SIDES[0][0] & SIDES[1][0], SIDES[0][0] & SIDES[1][1], SIDES[0][1] & SIDES[1][0], SIDES[0][1] & SIDES[1][1]];
 /// Masks of the sixteenths within a pixel of the middle, and of those of the pixel itself.
 const DISC: u64 = SIDES[0][0] | SIDES[0][1];
-const OWN: u64 = 0x3c3c_3c3c << 16;
+pub(super) const OWN_SIXTEENTHS: u64 = 0x3c3c_3c3c << 16;
 
 /// Settings of trimming.
 #[derive(Clone, Copy, Debug)]
@@ -259,7 +259,7 @@ impl Outline<'_> {
             // or it would vanish.
             let behind = ahead(-1);
             let stays = !is_empty(behind) && open_side(self.sixteenths.around(behind)).is_none();
-            return Some(points & OWN == 0 || stays);
+            return Some(points & OWN_SIXTEENTHS == 0 || stays);
         }
         if count >= DECISIVE_SIXTEENTHS {
             return Some(false);

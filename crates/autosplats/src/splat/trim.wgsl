@@ -1,14 +1,15 @@
 // Trim: removes the tails that splats leave around a silhouette. The CPU form is `trim.rs`.
 //
-// Reads: centers, sixteenths, measured, blocks. Reads and writes: surface, cover, extras. Writes: counters. Of other
+// Reads: centers, sixteenths, statistics, blocks. Reads and writes: surface, cover, extras. Writes: counters. Of other
 // pixels it reads only the rims, which no invocation writes.
 
 #import frame
-#import picture
-#import groups
-#import counters
-#import layers
+#import blocks
 #import blurred
+#import groups
+#import layers
+#import noise
+#import picture
 
 @group(0) @binding(1) var<storage, read_write> surface: array<vec4f>;
 @group(0) @binding(2) var<storage, read_write> cover: array<Cover>;
@@ -16,42 +17,15 @@
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read> centers: array<u32>;
 @group(0) @binding(6) var<storage, read> sixteenths: array<u32>;
-@group(0) @binding(7) var<storage, read> measured: array<f32>;
+@group(0) @binding(7) var<storage, read> statistics: FrameStatistics;
 @group(0) @binding(8) var<storage, read> blocks: array<u32>;
 
 // 1 to trim, 0 only to count covered pixels.
 override TRIMS: u32;
-// Length of lines in reaches of the splat, strides per reach, and strides added to a line.
-override LINE_LENGTH_REACHES: f32;
-override STRIDES_PER_REACH: f32;
-override EXTRA_STRIDES: i32;
-// Longest stride at which lines of neighbouring pixels stop at the same places.
-override MAX_ALIGNED_STRIDE_PX: i32;
-// Marked sixteenths around a pixel: least share on each side, as a divisor; fewest that decide around narrow and wide
-// splats; and how many decide alone.
-override SIDE_SHARE_DIVISOR: u32;
-override MIN_SIXTEENTHS_NARROW: u32;
-override MIN_SIXTEENTHS_WIDE: u32;
-override DECISIVE_SIXTEENTHS: u32;
-// Marked sixteenths from which 16 directions are tested instead of eight.
-override FINE_DIRECTION_SIXTEENTHS: u32;
-// Splats around a pixel: window radius, largest offset of their mean, fewest that decide around narrow and wide splats,
-// and widest narrow reach.
-override SPLAT_WINDOW_PX: f32;
-override MAX_SPLAT_MEAN_OFFSET_PX: f32;
-override MIN_SPLATS_NARROW: f32;
-override MIN_SPLATS_WIDE: f32;
-override MAX_NARROW_REACH_PX: f32;
-// Steps along the side of a pixel.
-override CENTER_STEPS: f32;
 
-// Side in pixels of the square of a workgroup.
-const SQUARE = 32u;
 const GROUP = 64u;
-// Pixels around that square that its border tests read (`MARGIN` of the CPU form), and the side of the square with
-// them.
-const MARGIN = 4u;
-const WIDE = 40u;
+// Side of the square of a workgroup, with the pixels around that its border tests read.
+const WIDE = SQUARE + 2u * MARGIN;
 // Blocks around the square's that show whether a fringe meets emptiness, one more than its width; and the side of the
 // square with them.
 const BLOCK_MARGIN = FRINGE_BLOCKS + 1u;
@@ -61,27 +35,17 @@ const WIDE_BLOCKS = SQUARE / BLOCK_PX + 2u * BLOCK_MARGIN;
 var<workgroup> covered: atomic<u32>;
 // Pixels that may stick out, as places in the square. They are few, so the workgroup finds them together first, and
 // then each invocation follows the lines of one.
-var<workgroup> tails: array<u32, 1024>;
+var<workgroup> tails: array<u32, SQUARE * SQUARE>;
 var<workgroup> tail_count: atomic<u32>;
 // Bits of empty pixels, per row of the wide square: the first 32 columns, then the others.
-var<workgroup> empties: array<atomic<u32>, 80>;
+var<workgroup> empties: array<atomic<u32>, 2u * WIDE>;
 // Bits of the middles of empty 3×3 squares, likewise.
-var<workgroup> middles: array<vec2u, 40>;
+var<workgroup> middles: array<vec2u, WIDE>;
 // Bits of empty blocks, per row of blocks, likewise.
 var<workgroup> empty_blocks: array<atomic<u32>, 2u * WIDE_BLOCKS>;
 var<workgroup> is_any_empty: atomic<u32>;
 // Masks of the sixteenths ahead in each direction, then those behind: two words of four rows each.
 var<workgroup> sides: array<vec2u, 2u * DIRECTIONS>;
-
-// Directions across which borders are tested, of which the first eight are the lines; and the mask of a pixel's own
-// sixteenths.
-const DIRECTIONS = 16u;
-const LINES = 8u;
-const ACROSS = array(
-    vec2i(1, 0), vec2i(0, 1), vec2i(1, 1), vec2i(1, -1), vec2i(2, 1), vec2i(1, 2), vec2i(2, -1), vec2i(1, -2),
-    vec2i(4, 1), vec2i(1, 4), vec2i(4, -1), vec2i(1, -4), vec2i(4, 3), vec2i(3, 4), vec2i(4, -3), vec2i(3, -4),
-);
-const OWN = vec2u(0x3c3c0000u, 0x3c3cu);
 
 @compute @workgroup_size(64)
 fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -111,7 +75,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
             atomicOr(&empties[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
         }
     }
-    if measured[0] > 0.0 {
+    if statistics.noise.level > 0.0 {
         for (var place = local; place < WIDE_BLOCKS * WIDE_BLOCKS; place += GROUP) {
             let at = vec2u(place % WIDE_BLOCKS, place / WIDE_BLOCKS);
             // Unsigned wrap-around moves blocks before the first far beyond the last.
@@ -229,7 +193,7 @@ fn blurred_by(place: vec2u, pixel: vec2u, reach_px: f32) -> f32 {
     if atomicLoad(&is_any_empty) == 0u {
         return 0.0;
     }
-    let noise = noise_px(pixel, surface[pixel.y * frame.size.x + pixel.x], reach_px);
+    let noise = noise_px(statistics.noise, pixel, surface[pixel.y * frame.size.x + pixel.x], reach_px);
     if !(noise >= MIN_BLURRING_NOISE_PX) {
         return 0.0;
     }
@@ -254,7 +218,7 @@ fn sticks_out(place: vec2u, pixel: vec2u, own: f32) -> bool {
     var answer = SILENT;
     let noise = blurred_by(place, pixel, abs(own));
     if noise > 0.0 {
-        answer = is_beside_blurred(pixel, abs(own), noise);
+        answer = is_beside_blurred(pixel, abs(own), noise, statistics.noise.sure);
     }
     if answer == SILENT && is_gap(place) {
         answer = is_beside(pixel, abs(own) > MAX_NARROW_REACH_PX, is_border(place));
@@ -281,7 +245,7 @@ fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
     let points = around(pixel);
     let of_disc = count_disc(points);
     let open = open_side(points);
-    if of_disc >= select(MIN_SIXTEENTHS_NARROW, MIN_SIXTEENTHS_WIDE, wide) && open < 2u * DIRECTIONS {
+    if of_disc >= select(MIN_SIXTEENTHS[0], MIN_SIXTEENTHS[1], wide) && open < 2u * DIRECTIONS {
         let towards = across(open);
         let steep = 2 * abs(towards) >= vec2i(max(abs(towards.x), abs(towards.y)));
         let step = select(vec2i(0), sign(towards), steep);
@@ -290,7 +254,7 @@ fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
         }
         // A thin structure or an isolated point has points in this pixel, and no closed pixel behind it. It stays, or
         // it would vanish.
-        if all((points & OWN) == vec2u(0u)) {
+        if all((points & OWN_SIXTEENTHS) == vec2u(0u)) {
             return YES;
         }
         let behind = vec2u(vec2i(pixel) - step);
@@ -302,7 +266,7 @@ fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
     if !border {
         return SILENT;
     }
-    return mean_of_splats(pixel, select(MIN_SPLATS_NARROW, MIN_SPLATS_WIDE, wide));
+    return mean_of_splats(pixel, select(MIN_SPLATS[0], MIN_SPLATS[1], wide));
 }
 
 fn is_empty(pixel: vec2u) -> bool {

@@ -1,7 +1,7 @@
 //! The stage on the GPU against the CPU, with the same surfels.
 
 use super::super::cells::{CellRow, Cells, Cluster, Level};
-use super::super::noise::{FrameStatistics, Noise};
+use super::super::noise::Noise;
 use super::super::tests::{Case, K, PROJECTIONS, angle};
 use super::*;
 use crate::fit::gpu::surfel_buffer;
@@ -10,8 +10,6 @@ use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::test_clouds::{self, noisy};
 
-/// Clusters of a cell that are contiguous on the device.
-pub(crate) const BUNCH: usize = 4;
 /// Share of cells that may differ: rounding moves a few means into the next slab.
 const UNLIKE_CELLS: f64 = 1e-3;
 /// Share of surfels that may differ: rounding decides whether a ball is the last.
@@ -44,15 +42,9 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> DeviceResults {
     }
     steps.iter().for_each(|step| recorder.run(step));
     recorder.finish();
-    let [level, power, k_radius, sheet_level, most, sure] =
-        read_back::<[f32; NOISE_FLOATS]>(gpu, &buffers.measured, 1).expect("noise")[0];
     DeviceResults {
         cells: read_cells(gpu, &buffers, screen.size),
-        usual: FrameStatistics {
-            noise: Noise { level, power, most, sure },
-            k_radius,
-            sheet_level: sheet_level as usize,
-        },
+        usual: read_back(gpu, &buffers.statistics, 1).expect("statistics")[0],
         surfels: read_back(gpu, &surfels, fitted.len()).expect("surfels"),
     }
 }
@@ -233,15 +225,6 @@ fn however_many_sum_up_a_ball_the_device_adapts_as_the_host_does() {
                 .unwrap_or_else(|error| panic!("{name}, {together}: {error}"));
         }
     }
-}
-
-#[test]
-fn sheets_are_as_large_as_the_host_takes_them_for() {
-    let source = crate::gpu::link("#import sheet\n");
-    let module = wgpu::naga::front::wgsl::parse_str(&source).expect("WGSL");
-    let is_sheet = |ty: &wgpu::naga::Type| ty.name.as_deref() == Some("Sheet");
-    let sheet = module.types.iter().find(|(_, ty)| is_sheet(ty)).expect("a sheet").1;
-    assert_eq!(sheet.inner.size(module.to_ctx()) as usize, size_of::<Sheet>());
 }
 
 #[test]

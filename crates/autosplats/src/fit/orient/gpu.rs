@@ -2,12 +2,20 @@
 
 use super::{MIN_EYE_COSINE, MIN_SENSOR_COSINE, Sensor, Sensors};
 use crate::Error;
-use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::{Round, ScreenBuffers};
+use crate::fit::Surfel;
+use crate::gpu::{Gpu, Library, Pass, Step, constants, passes};
+use crate::project::gpu::{Counter, Round, ScreenBuffers};
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[ORIENT];
-const ORIENT: PassSource = PassSource::new("fit/orient/orient", include_str!("orient.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: &[],
+    constants: &[Counter::CONSTANTS, constants!(in Surfel: BACK, LINE), constants![MIN_EYE_COSINE, MIN_SENSOR_COSINE]],
+};
+
+passes! {
+    "fit/orient", LIBRARY;
+    ORIENT = "orient",
+}
 
 /// Allocates the sensors of a cloud.
 ///
@@ -34,14 +42,7 @@ impl OrientPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        let round = |round: Round| {
-            let constants = [
-                ("ROUND", f64::from(round as u32)),
-                ("MIN_SENSOR_COSINE", MIN_SENSOR_COSINE.into()),
-                ("MIN_EYE_COSINE", MIN_EYE_COSINE.into()),
-            ];
-            Pass::new(gpu, &ORIENT, &constants)
-        };
+        let round = |round: Round| Pass::new(gpu, &ORIENT, &[round.constant()]);
         Ok(Self { rounds: [round(Round::Active)?, round(Round::Recovered)?] })
     }
 

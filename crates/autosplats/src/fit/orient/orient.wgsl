@@ -4,7 +4,7 @@
 
 #import frame
 #import groups
-#import counters
+#import round
 #import surfel
 
 // Position of the sensor of a run of points.
@@ -19,11 +19,6 @@ struct Sensor {
 // Runs of points, in the order of the points. The first begins at point 0.
 @group(0) @binding(2) var<storage, read> sensors: array<Sensor>;
 @group(0) @binding(3) var<storage, read_write> surfels: array<Surfel>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
-override MIN_SENSOR_COSINE: f32;
-override MIN_EYE_COSINE: f32;
 
 // The sensor of a point.
 fn sensor_of(point: u32) -> vec3f {

@@ -20,7 +20,7 @@ pub(crate) fn read_screen(gpu: &Gpu, screen: &ScreenBuffers) -> (ScreenPoints, V
     let (strip_px, cell_px) = (counter(Counter::StripPx), counter(Counter::CellPx));
     let columns = counter(Counter::CellColumns);
     let cells = columns * height.div_ceil(cell_px);
-    let density: Vec<[u32; 2]> = read_back(gpu, &screen.density, cells).expect("a grid");
+    let density: Vec<DensityCell> = read_back(gpu, &screen.density, cells).expect("a grid");
     let mut read = ScreenPoints {
         points: read_back(gpu, &screen.points, counter(Counter::Visible)).expect("points"),
         source: list(&screen.source, counter(Counter::Visible)),
@@ -33,9 +33,8 @@ pub(crate) fn read_screen(gpu: &Gpu, screen: &ScreenBuffers) -> (ScreenPoints, V
     read.cells.start = list(&screen.cell_start, height.div_ceil(strip_px) * width + 1);
     read.density.cell_px = cell_px;
     read.density.columns = columns;
-    read.density.count = density.iter().map(|cell| cell[0]).collect();
-    let nearest = |bits: u32| if bits == u32::MAX { f32::INFINITY } else { f32::from_bits(bits) };
-    read.density.nearest = density.iter().map(|cell| nearest(cell[1])).collect();
+    read.density.count = density.iter().map(|cell| cell.count).collect();
+    read.density.nearest = density.iter().map(|cell| cell.nearest).collect();
     read.dropped.not_finite = counter(Counter::NotFinite);
     read.dropped.behind = counter(Counter::Behind);
     read.dropped.outside = counter(Counter::Outside);
@@ -57,9 +56,8 @@ pub(crate) fn upload_screen(gpu: &Gpu, screen: &ScreenPoints, view: &View) -> Sc
     ] {
         counters[counter as usize] = value as u32;
     }
-    let depth = |nearest: f32| if nearest.is_finite() { nearest.to_bits() } else { u32::MAX };
     let cells = screen.density.count.iter().zip(&screen.density.nearest);
-    let density: Vec<[u32; 2]> = cells.map(|(&count, &nearest)| [count, depth(nearest)]).collect();
+    let density: Vec<_> = cells.map(|(&count, &nearest)| DensityCell { count, nearest }).collect();
     let queries = [&screen.active[..], &screen.passive].concat();
     let write = |buffer: &wgpu::Buffer, bytes: &[u8]| gpu.queue.write_buffer(buffer, 0, bytes);
     write(&buffers.counters, bytemuck::cast_slice(&counters));

@@ -2,13 +2,13 @@
 
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use crate::gpu::{INT64_ATOMICS, PassSource};
+use crate::gpu::{INT64_ATOMICS, PassSource, link};
 
 mod layouts;
 
-/// Whether a pass is a render pass.
+/// Whether a pass is a render pass: all of them blend.
 fn is_raster(pass: &PassSource) -> bool {
-    crate::search::splat_communication::gpu::RASTER_PASSES.iter().any(|raster| raster.path == pass.path)
+    pass.needs.contains(wgpu::Features::FLOAT32_BLENDABLE)
 }
 
 fn passes() -> impl Iterator<Item = &'static PassSource> {
@@ -17,7 +17,6 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
         crate::search::past::gpu::PASSES,
         crate::search::screen_grid::gpu::PASSES,
         crate::search::splat_communication::gpu::PASSES,
-        crate::search::splat_communication::gpu::RASTER_PASSES,
         crate::search::kd_tree::gpu::PASSES,
         crate::fit::gpu::PASSES,
         crate::fit::orient::gpu::PASSES,
@@ -64,4 +63,21 @@ fn what_a_pass_does_not_declare_is_refused() {
     };
     let validated = Validator::new(ValidationFlags::all(), capabilities(&pass)).validate(&pass.module());
     assert!(validated.is_err(), "64-bit atomics are not core");
+}
+
+#[test]
+fn every_file_is_imported_and_every_constant_named() {
+    let linked: Vec<_> = passes().map(|pass| link(pass.source, pass.library)).collect();
+    let files = || passes().flat_map(|pass| pass.library.files.iter().copied().flatten());
+    let sources = || files().map(|(_, source)| *source).chain(passes().map(|pass| pass.source));
+    for (name, _) in files() {
+        let import = format!("#import {name}");
+        assert!(sources().any(|source| source.lines().any(|line| line == import)), "no file has {import}");
+    }
+    let constants = passes().flat_map(|pass| pass.library.constants.iter().copied().flatten());
+    // Of an enum, passes may name some variants.
+    for constant in constants.filter(|constant| constant.name == constant.name.to_uppercase()) {
+        let declared = constant.in_wgsl();
+        assert!(linked.iter().any(|linked| linked.contains(&declared)), "no pass names {declared}");
+    }
 }

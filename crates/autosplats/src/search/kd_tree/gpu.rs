@@ -1,59 +1,74 @@
 //! The kd-tree on the GPU: passes that build the tree level by level, then search it.
 
 use crate::Error;
-use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
+use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, Step, constants, files, indices, passes};
 use crate::project::Chunk;
-use crate::project::gpu::Round;
+use crate::project::gpu::{Counter, Round};
 use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers};
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[BEGIN, SPLIT, COUNT, PLACE, SCATTER, SMALL_TREE, SEARCH, MOMENTS];
-const BEGIN: PassSource = PassSource::new("search/kd_tree/build/begin", include_str!("build/begin.wgsl"));
-const SPLIT: PassSource = PassSource::new("search/kd_tree/build/split", include_str!("build/split.wgsl"));
-const COUNT: PassSource = PassSource::new("search/kd_tree/build/count", include_str!("build/count.wgsl"));
-const PLACE: PassSource = PassSource::new("search/kd_tree/build/place", include_str!("build/place.wgsl"));
-const SCATTER: PassSource = PassSource::new("search/kd_tree/build/scatter", include_str!("build/scatter.wgsl"));
-const SMALL_TREE: PassSource =
-    PassSource::new("search/kd_tree/build/small_tree", include_str!("build/small_tree.wgsl"));
-const SEARCH: PassSource = PassSource::new("search/kd_tree/search", include_str!("search.wgsl"));
-const MOMENTS: PassSource = PassSource::new("search/kd_tree/moments", include_str!("moments.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: &[files!["kd_build", "kd_chunk", "kd_tree"]],
+    constants: &[
+        Counter::CONSTANTS,
+        Work::CONSTANTS,
+        constants![CHUNK_POINTS, MAX_SMALL_NODE_POINTS, MAX_WALK_VISITS, MIN_LEAF_POINTS, STEP_COST_POINTS],
+    ],
+};
+
+passes! {
+    "search/kd_tree", LIBRARY;
+    BEGIN = "build/begin",
+    SPLIT = "build/split",
+    COUNT = "build/count",
+    PLACE = "build/place",
+    SCATTER = "build/scatter",
+    SMALL_TREE = "build/small_tree",
+    SEARCH = "search",
+    MOMENTS = "moments",
+}
 
 /// Most points of a small node.
 const MAX_SMALL_NODE_POINTS: usize = 64;
 /// Fewest points of a leaf, where there are more.
 const MIN_LEAF_POINTS: usize = 8;
 /// Number of points whose reading costs as much as a step down the tree. See docs/decisions/0015-search-engines.md.
-const STEP_COST_POINTS: f64 = 16.0;
+const STEP_COST_POINTS: f32 = 16.0;
 /// Points of a large node that one workgroup processes.
-const CHUNK: usize = 256;
+const CHUNK_POINTS: usize = 256;
 /// Most nodes and points that one walk through the tree visits. Software devices end an invocation silently after
 /// 65535 rounds of its loops, and a search is two walks.
 const MAX_WALK_VISITS: u32 = 12_000;
 
-/// `KdPoint` of `shared/kd_tree.wgsl`.
+/// `KdPoint` of `imports/kd_tree.wgsl`.
 type Point = [u32; 4];
-/// `KdNode` of `shared/kd_tree.wgsl`: a corner, a child or a point, the other corner, a number of points.
+/// `KdNode` of `imports/kd_tree.wgsl`: a corner, a child or a point, the other corner, a number of points.
 type Node = [u32; 8];
-/// `KdLarge` of `shared/kd_build.wgsl`.
+/// `KdLarge` of `imports/kd_build.wgsl`.
 type Large = [u32; 16];
-/// `KdSmall` of `shared/kd_build.wgsl`.
+/// `KdSmall` of `imports/kd_build.wgsl`.
 type Small = [u32; 4];
-/// `KdState` of `shared/kd_build.wgsl`.
+/// `KdState` of `imports/kd_build.wgsl`.
 type State = [u32; 6];
 
-/// Indirect dispatches of the engine, in the order of `shared/kd_work.wgsl`.
-#[derive(Clone, Copy, Debug)]
-enum Work {
-    Large,
-    Chunks,
-    Small,
-    Points,
-}
+/// Structs of WGSL with their sizes here.
+#[cfg(test)]
+pub(crate) const SIZES: &[(&str, usize)] = &[
+    ("KdNode", size_of::<Node>()),
+    ("KdLarge", size_of::<Large>()),
+    ("KdSmall", size_of::<Small>()),
+    ("KdState", size_of::<State>()),
+];
 
-/// Number of indirect dispatches.
-const WORK_COUNT: u64 = Work::Points as u64 + 1;
-/// Bytes of the arguments of an indirect dispatch.
-const WORK_BYTES: u64 = 12;
+indices! {
+    /// Indirect dispatches of the engine.
+    enum Work in "Work" {
+        Large,
+        Chunks,
+        Small,
+        Points,
+    }
+}
 
 /// Number of levels of large nodes to record: 5/2 per halving of the points, and some for inexact sampled medians. A
 /// split that leaves three quarters on one side is not yet lopsided and takes 1/log₂(4/3) = 2.41 levels per halving. A
@@ -92,7 +107,7 @@ impl TreeBuffers {
         let points = |_| gpu.storage::<Point>("points of the kd-tree", capacity);
         let arguments = |_| {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
-            gpu.buffer("arguments of the kd-tree", WORK_COUNT * WORK_BYTES, usage)
+            gpu.buffer("arguments of the kd-tree", Work::CONSTANTS.len() as u64 * DISPATCH_BYTES, usage)
         };
         Ok(Self {
             capacity: capacity as u32,
@@ -102,14 +117,14 @@ impl TreeBuffers {
             state: both(|_| gpu.storage::<State>("state of the kd-tree", 1))?,
             arguments: both(arguments)?,
             small: gpu.storage::<Small>("small nodes of the kd-tree", upper)?,
-            chunk_sums: gpu.storage::<u32>("chunks of the kd-tree", capacity.div_ceil(CHUNK) + large + 1)?,
+            chunk_sums: gpu.storage::<u32>("chunks of the kd-tree", capacity.div_ceil(CHUNK_POINTS) + large + 1)?,
             radii: gpu.storage::<f32>("k-radii", capacity)?,
         })
     }
 
     /// Number of workgroups of `work` at a level of this parity.
     fn groups(&self, parity: usize, work: Work) -> Groups {
-        Groups::Counted(self.arguments[parity].clone(), work as u64 * WORK_BYTES)
+        Groups::Counted(self.arguments[parity].clone(), work as u64 * DISPATCH_BYTES)
     }
 }
 
@@ -137,20 +152,15 @@ impl KdTreePasses {
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let pass = |source| Pass::new(gpu, source, &[]);
-        let most_seen = ("MAX_WALK_VISITS", MAX_WALK_VISITS.into());
-        let moments = |round| Pass::new(gpu, &MOMENTS, &[("ROUND", f64::from(round as u32)), most_seen]);
+        let moments = |round: Round| Pass::new(gpu, &MOMENTS, &[round.constant()]);
         Ok(Self {
             begin: pass(&BEGIN)?,
             split: pass(&SPLIT)?,
             count: pass(&COUNT)?,
             place: pass(&PLACE)?,
             scatter: pass(&SCATTER)?,
-            small_tree: Pass::new(
-                gpu,
-                &SMALL_TREE,
-                &[("MIN_LEAF_POINTS", MIN_LEAF_POINTS as f64), ("STEP_COST_POINTS", STEP_COST_POINTS)],
-            )?,
-            search: Pass::new(gpu, &SEARCH, &[most_seen])?,
+            small_tree: pass(&SMALL_TREE)?,
+            search: pass(&SEARCH)?,
             moments: [moments(Round::Active)?, moments(Round::Recovered)?],
         })
     }

@@ -7,9 +7,9 @@
 
 #import frame
 #import groups
-#import counters
-#import surfel
 #import kd_tree
+#import neighborhood
+#import round
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> source: array<u32>;
@@ -19,11 +19,6 @@
 @group(0) @binding(6) var<storage, read> nodes: array<KdNode>;
 @group(0) @binding(7) var<storage, read> points: array<KdPoint>;
 @group(0) @binding(8) var<storage, read_write> neighborhoods: array<Neighborhood>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
-// Most nodes and points that a walk visits.
-override MAX_WALK_VISITS: u32;
 
 struct Task {
     first: u32,

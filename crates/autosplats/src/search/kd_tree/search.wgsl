@@ -8,9 +8,8 @@
 
 #import frame
 #import groups
-#import range_keys
-#import kd_tree
 #import kd_build
+#import kd_tree
 
 @group(0) @binding(1) var<storage, read> state: KdState;
 @group(0) @binding(2) var<storage, read> points: array<KdPoint>;
@@ -21,9 +20,6 @@ const N_HIST = 32u;
 const N_ITER = 2u;
 // For the rounding of a distance and of its bin.
 const ROUNDING = 1.000001;
-
-// Most nodes and points that one range search visits.
-override MAX_WALK_VISITS: u32;
 
 @compute @workgroup_size(64)
 fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {

@@ -1,13 +1,17 @@
 //! The k-radii of the last frame on the GPU.
 
 use crate::Error;
-use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::{ScreenBuffers, Work};
+use crate::gpu::{Gpu, Library, Pass, Step, passes};
+use crate::project::gpu::{Counter, ScreenBuffers, Work};
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[CLEAR_PAST, KEEP_PAST];
-const CLEAR_PAST: PassSource = PassSource::new("search/past/clear_past", include_str!("clear_past.wgsl"));
-const KEEP_PAST: PassSource = PassSource::new("search/past/keep_past", include_str!("keep_past.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library { files: &[], constants: &[Counter::CONSTANTS] };
+
+passes! {
+    "search/past", LIBRARY;
+    CLEAR_PAST = "clear_past",
+    KEEP_PAST = "keep_past",
+}
 
 /// Allocates a buffer for the k-radii of pictures of `size`, empty if `None`.
 ///

@@ -4,9 +4,8 @@
 
 #import frame
 #import groups
-#import counters
+#import neighborhood
 #import screen
-#import surfel
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> points: array<ScreenPoint>;

@@ -1,22 +1,38 @@
 //! The screen-grid search on the GPU: one invocation per point, or per four points for larger k.
 
-use super::cpu::{FIRST_WINDOW_SLACK, MIN_RADIUS_GROWTH};
+use super::cpu;
 use crate::Error;
-use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::{Round, ScreenBuffers, WorkPass};
-use crate::search::past;
-use crate::search::{BOUND_STEP, MARGIN_PX, MAX_CANDIDATES, MIN_CROWDED_CANDIDATES, OUTLIER_RADIUS_SLACK};
+use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
+use crate::project::gpu::{Counter, Round, ScreenBuffers, WorkPass};
+use crate::search::gpu::IMPORTS;
+use crate::search::{self, past};
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[SEARCH, SEARCH_FOUR];
-const SEARCH: PassSource = PassSource::new("search/screen_grid/search", include_str!("search.wgsl"));
-const SEARCH_FOUR: PassSource = PassSource::new("search/screen_grid/search_four", include_str!("search_four.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: &[IMPORTS, files!["nearest", "past", "search_task", "window_points"]],
+    constants: &[
+        Counter::CONSTANTS,
+        constants!(in cpu: FIRST_WINDOW_SLACK, MIN_RADIUS_GROWTH),
+        constants!(in past: PAST_FIRST_RADII_RANGE, PAST_RADIUS_SLACK),
+        constants!(in search: BOUND_STEP, MARGIN_PX, MAX_CANDIDATES, MIN_CROWDED_CANDIDATES, OUTLIER_RADIUS_SLACK),
+    ],
+};
+
+passes! {
+    "search/screen_grid", LIBRARY;
+    SEARCH = "search",
+    SEARCH_FOUR = "search_four",
+}
 
 /// Least k for which four points are searched at a time. See docs/decisions/0015-search-engines.md.
 const MIN_K_FOUR_AT_A_TIME: u32 = 11;
 
-/// `Neighborhood` of `shared/surfel.wgsl`.
+/// `Neighborhood` of `shared/neighborhood.wgsl`.
 type Neighborhood = [f32; 12];
+
+/// Structs of WGSL with their sizes here.
+#[cfg(test)]
+pub(crate) const SIZES: &[(&str, usize)] = &[("Neighborhood", size_of::<Neighborhood>())];
 
 /// Allocates the neighbourhoods of `capacity` queries.
 ///
@@ -42,28 +58,11 @@ struct RoundPasses {
 
 impl RoundPasses {
     fn new(gpu: &Gpu, k: u32, four: bool, round: Round) -> Result<Self, Error> {
-        let [least, most] = past::PAST_FIRST_RADII_RANGE;
-        let common = [
-            ("MIN_PAST_FIRST_RADII", least.into()),
-            ("MAX_PAST_FIRST_RADII", most.into()),
-            ("PAST_RADIUS_SLACK", past::PAST_RADIUS_SLACK.into()),
-            ("ROUND", f64::from(round as u32)),
-            ("K", k.into()),
-            ("FIRST_WINDOW_SLACK", FIRST_WINDOW_SLACK.into()),
-            ("MARGIN_PX", MARGIN_PX.into()),
-            ("MAX_CANDIDATES", MAX_CANDIDATES as f64),
-            ("MIN_CROWDED_CANDIDATES", MIN_CROWDED_CANDIDATES as f64),
-            ("BOUND_STEP", BOUND_STEP.into()),
-        ];
-        let own = [
-            ("QUADS", k.div_ceil(4).into()),
-            ("MIN_RADIUS_GROWTH", MIN_RADIUS_GROWTH.into()),
-            ("OUTLIER_RADIUS_SLACK", OUTLIER_RADIUS_SLACK.into()),
-            ("LEFT_ONLY", f64::from(u8::from(four))),
-        ];
+        let common = [round.constant(), ("K", k.into())];
+        let left_only = ("LEFT_ONLY", f64::from(u8::from(four)));
         Ok(Self {
             four: if four { Some(Pass::new(gpu, &SEARCH_FOUR, &common)?) } else { None },
-            one: Pass::new(gpu, &SEARCH, &[&common[..], &own].concat())?,
+            one: Pass::new(gpu, &SEARCH, &[&common[..], &[left_only]].concat())?,
         })
     }
 }

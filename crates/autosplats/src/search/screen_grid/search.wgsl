@@ -8,21 +8,19 @@
 // Reads: counters, density, cell_start, points, queries, left, past. Writes: neighborhoods, counters.
 
 #import frame
-#import groups
-#import counters
 #import density
 #import gaps
+#import groups
+#import nearest
+#import neighborhood
+#import past
 #import screen
-#import surfel
+#import search_task
 #import window
 #import window_points
-#import nearest
-#import search_task
-#import reproject
-#import past
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(4) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
@@ -30,12 +28,10 @@
 @group(0) @binding(7) var<storage, read> left: array<u32>;
 @group(0) @binding(8) var<storage, read> past: array<u32>;
 
-override MIN_RADIUS_GROWTH: f32;
-override OUTLIER_RADIUS_SLACK: f32;
 // Whether to search only the queries in `left`, whose searches `search_four` did not finish.
 override LEFT_ONLY: bool;
 
-// Rounds of loops (`rounds` in shared/window_points.wgsl) after which a query counts as bounded. The limit is far below
+// Rounds of loops (`rounds` of `window_points`) after which a query counts as bounded. The limit is far below
 // a software device's: such a device runs several invocations together, each loop as long as the longest of them.
 const MAX_LOOP_ROUNDS = 25000u;
 
@@ -138,7 +134,7 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> Win
     return seen;
 }
 
-// Searches the neighbourhood of one query. `task`, the counts of the frame, is defined in shared/search_task.wgsl.
+// Searches the neighbourhood of one query. `task`, the counts of the frame, is defined in `search_task`.
 fn find(query: u32, center: vec3f, initial_radius: f32) -> SearchResult {
     let strip_px = f32(task.strip_px);
     let outlier_radius = frame.outlier_growth * initial_radius;
@@ -276,7 +272,7 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         let query = queries[task.first + index];
         let point = points[query];
         let cell = density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns);
-        let initial_radius = first_radius(density[cell].x, task.cell_px, point.position_view.z);
+        let initial_radius = initial_radius_of(density[cell].count, task.cell_px, point.position_view.z);
         let found = find(query, point.position_view, initial_radius);
         neighborhoods[task.first + index] = moments(point.position_view, found.squared);
         if found.is_clamped {

@@ -11,19 +11,17 @@
 // Reads: counters, density, cell_start, points, queries, past. Writes: neighborhoods, left, counters.
 
 #import frame
-#import groups
-#import counters
 #import density
+#import groups
+#import neighborhood
+#import past
 #import screen
-#import surfel
+#import search_task
 #import window
 #import window_points
-#import search_task
-#import reproject
-#import past
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(4) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
@@ -328,7 +326,7 @@ fn search_four(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
             four.x[lane] = point.position_view.x;
             four.y[lane] = point.position_view.y;
             four.z[lane] = point.position_view.z;
-            initial_radius[lane] = first_radius(density[cell].x, task.cell_px, point.position_view.z);
+            initial_radius[lane] = initial_radius_of(density[cell].count, task.cell_px, point.position_view.z);
         }
         found = find(four, initial_radius, valid);
         sum_moments(four, found, first);

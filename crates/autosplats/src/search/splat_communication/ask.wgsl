@@ -3,18 +3,14 @@
 // Reads: points, queries, counters. Writes: the second radius texture.
 
 #import frame
-#import counters
-#import screen
 #import communication
-#import window
+#import round
+#import screen
 #import splat_box
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> queries: array<u32>;
 @group(0) @binding(3) var<storage, read> counters: array<u32>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
 
 @vertex
 fn ask_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {

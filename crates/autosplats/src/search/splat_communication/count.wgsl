@@ -5,11 +5,11 @@
 // Reads: points, queries, counters, arguments, the position texture and both radius textures. Writes: convergence.
 
 #import frame
-#import groups
-#import counters
-#import screen
-#import radius_search
 #import communication
+#import groups
+#import radius_search
+#import round
+#import screen
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> queries: array<u32>;
@@ -19,9 +19,6 @@
 @group(0) @binding(6) var positions: texture_2d<f32>;
 @group(0) @binding(7) var counts: texture_2d<f32>;
 @group(0) @binding(8) var radii: texture_2d<f32>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
 
 var<workgroup> unconverged: atomic<u32>;
 

@@ -3,17 +3,12 @@
 // Reads: counters. Writes: arguments, convergence.
 
 #import frame
-#import counters
 #import communication
+#import round
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> arguments: Arguments;
 @group(0) @binding(3) var<storage, read_write> convergence: array<u32>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
-// Fraction of the points that need not converge: 1 - t_conv [Paper, §5.2].
-override UNCONVERGED: f32;
 
 @compute @workgroup_size(1)
 fn decide() {

@@ -4,12 +4,10 @@
 // Reads: points, counters, the position texture and both radius textures. Writes: the feedback texture.
 
 #import frame
-#import counters
-#import screen
 #import communication
-#import window
-#import splat_box
 #import radius_search
+#import screen
+#import splat_box
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> counters: array<u32>;

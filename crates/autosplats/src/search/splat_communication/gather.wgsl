@@ -5,12 +5,9 @@
 // Reads: points, the position and the feedback texture. Writes: both radius textures.
 
 #import frame
-#import screen
-#import communication
-#import window
-#import splat_box
-#import radius_search
 #import answer
+#import radius_search
+#import screen
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var positions: texture_2d<f32>;

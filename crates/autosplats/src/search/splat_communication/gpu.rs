@@ -4,33 +4,35 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::TextureFormat::{Depth32Float, Rgba32Float};
 
 use crate::Error;
-use crate::gpu::{DepthMask, Draw, Gpu, Groups, Load, Pass, PassSource, RasterPass, Step, Target, Targets};
-use crate::project::gpu::Round;
+use crate::gpu::{
+    DepthMask, Draw, Gpu, Groups, Library, Load, Pass, PassSource, RasterPass, Step, Target, Targets, constants, files,
+    passes,
+};
+use crate::project::gpu::{Counter, Round};
 use crate::search::MARGIN_PX;
-use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers};
+use crate::search::gpu::{EnginePasses, EngineSteps, IMPORTS, SearchBuffers};
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[BEGIN, COUNT, DECIDE, KEEP_MEAN, KEEP_COVARIANCE];
-#[cfg(test)]
-pub(crate) const RASTER_PASSES: &[PassSource] = &[MASK, ASK, CLEAR, DISTRIBUTE, GATHER, MEAN, COVARIANCE];
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: &[IMPORTS, files!["answer", "communication", "radius_search", "splat_box"]],
+    constants: &[Counter::CONSTANTS, constants![MARGIN_PX, UNCONVERGED = UNCONVERGED as f32]],
+};
 
-macro_rules! source {
-    ($make:ident, $name:literal) => {
-        PassSource::$make(concat!("search/splat_communication/", $name), include_str!(concat!($name, ".wgsl")))
-    };
+passes! {
+    "search/splat_communication", LIBRARY;
+    MASK = "mask" needs wgpu::Features::FLOAT32_BLENDABLE,
+    ASK = "ask" needs wgpu::Features::FLOAT32_BLENDABLE,
+    CLEAR = "clear" needs wgpu::Features::FLOAT32_BLENDABLE,
+    DISTRIBUTE = "distribute" needs wgpu::Features::FLOAT32_BLENDABLE,
+    GATHER = "gather" needs wgpu::Features::FLOAT32_BLENDABLE,
+    MEAN = "mean" needs wgpu::Features::FLOAT32_BLENDABLE,
+    COVARIANCE = "covariance" needs wgpu::Features::FLOAT32_BLENDABLE,
+    BEGIN = "begin",
+    COUNT = "count",
+    DECIDE = "decide",
+    KEEP_MEAN = "keep_mean",
+    KEEP_COVARIANCE = "keep_covariance",
 }
-const MASK: PassSource = source!(blending, "mask");
-const ASK: PassSource = source!(blending, "ask");
-const CLEAR: PassSource = source!(blending, "clear");
-const DISTRIBUTE: PassSource = source!(blending, "distribute");
-const GATHER: PassSource = source!(blending, "gather");
-const MEAN: PassSource = source!(blending, "mean");
-const COVARIANCE: PassSource = source!(blending, "covariance");
-const BEGIN: PassSource = source!(new, "begin");
-const COUNT: PassSource = source!(new, "count");
-const DECIDE: PassSource = source!(new, "decide");
-const KEEP_MEAN: PassSource = source!(new, "keep_mean");
-const KEEP_COVARIANCE: PassSource = source!(new, "keep_covariance");
 
 /// Most iterations. A bracket between equal distances takes about fourteen to shrink to the precision of floats.
 pub(crate) const ITERATIONS: usize = 16;
@@ -44,7 +46,7 @@ const GATHERED_BYTES: u32 = 32;
 /// Arguments of an indirect draw.
 type DrawArguments = [u32; 4];
 
-/// Arguments of all draws, laid out as in `shared/communication.wgsl`.
+/// Arguments of all draws, laid out as in `imports/communication.wgsl`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Arguments {
@@ -95,31 +97,30 @@ impl CommunicationPasses {
     /// [`Error::Device`] if the device lacks a feature that the paper's method needs.
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         check(gpu)?;
-        let margin = ("MARGIN_PX", f64::from(MARGIN_PX));
         let raster = |source: &PassSource, constants: &[(&str, f64)], targets: &[Target]| {
             RasterPass::new(gpu, source, constants, targets, DepthMask::Greater)
         };
-        let distribute = |last: bool| raster(&DISTRIBUTE, &[margin, ("IS_LAST", last.into())], &[Target::AddAndMax]);
+        let distribute = |last: bool| raster(&DISTRIBUTE, &[("IS_LAST", last.into())], &[Target::AddAndMax]);
         let round = |round: Round| {
-            let round = ("ROUND", f64::from(round as u32));
+            let round = round.constant();
             Ok::<_, Error>(RoundPasses {
                 begin: Pass::new(gpu, &BEGIN, &[round])?,
-                ask: raster(&ASK, &[margin, round], &[Target::Replace])?,
+                ask: raster(&ASK, &[round], &[Target::Replace])?,
                 count: Pass::new(gpu, &COUNT, &[round])?,
-                decide: Pass::new(gpu, &DECIDE, &[round, ("UNCONVERGED", UNCONVERGED)])?,
+                decide: Pass::new(gpu, &DECIDE, &[round])?,
                 keep_mean: Pass::new(gpu, &KEEP_MEAN, &[round])?,
                 keep_covariance: Pass::new(gpu, &KEEP_COVARIANCE, &[round])?,
             })
         };
         Ok(Self {
-            mask: RasterPass::new(gpu, &MASK, &[margin], &[Target::Replace], DepthMask::Write)?,
+            mask: RasterPass::new(gpu, &MASK, &[], &[Target::Replace], DepthMask::Write)?,
             clear_feedback: raster(&CLEAR, &[], &[Target::Replace])?,
             clear_radii: raster(&CLEAR, &[], &[Target::Replace; 2])?,
             distribute: distribute(false)?,
             distribute_last: distribute(true)?,
-            gather: raster(&GATHER, &[margin], &GATHERED)?,
-            mean: raster(&MEAN, &[margin], &GATHERED)?,
-            covariance: raster(&COVARIANCE, &[margin], &GATHERED)?,
+            gather: raster(&GATHER, &[], &GATHERED)?,
+            mean: raster(&MEAN, &[], &GATHERED)?,
+            covariance: raster(&COVARIANCE, &[], &GATHERED)?,
             rounds: [round(Round::Active)?, round(Round::Recovered)?],
         })
     }

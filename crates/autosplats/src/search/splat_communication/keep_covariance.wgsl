@@ -4,9 +4,9 @@
 
 #import frame
 #import groups
-#import counters
+#import neighborhood
+#import round
 #import screen
-#import surfel
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> queries: array<u32>;
@@ -14,9 +14,6 @@
 @group(0) @binding(4) var<storage, read_write> neighborhoods: array<Neighborhood>;
 @group(0) @binding(5) var first_products: texture_2d<f32>;
 @group(0) @binding(6) var last_products: texture_2d<f32>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
 
 @compute @workgroup_size(256)
 fn keep_covariance(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {

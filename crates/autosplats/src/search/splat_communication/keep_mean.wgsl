@@ -4,10 +4,10 @@
 
 #import frame
 #import groups
-#import counters
-#import screen
-#import surfel
+#import neighborhood
 #import radius_search
+#import round
+#import screen
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> queries: array<u32>;
@@ -16,9 +16,6 @@
 @group(0) @binding(5) var feedback: texture_2d<f32>;
 @group(0) @binding(6) var sums: texture_2d<f32>;
 @group(0) @binding(7) var furthest: texture_2d<f32>;
-
-// 0: the active points; 1: the recovered points, which follow them.
-override ROUND: u32;
 
 @compute @workgroup_size(256)
 fn keep_mean(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {

@@ -5,19 +5,14 @@
 // depth mask.
 
 #import frame
-#import counters
+#import communication
 #import density
 #import screen
-#import communication
-#import window
 #import splat_box
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
-@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(2) var<storage, read> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read> counters: array<u32>;
-
-// A radius that rounds to 0 would never grow.
-const MIN_POSITIVE = 1.1754943508222875e-38;
 
 struct Splat {
     @builtin(position) position: vec4f,
@@ -31,7 +26,7 @@ fn mask_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
     let depth = point.position_view.z;
     let cell_px = counters[CELL_PX];
     let cell = density_cell(pixel, cell_px, counters[CELL_COLUMNS]);
-    let radius = max(first_radius(density[cell].x, cell_px, depth), MIN_POSITIVE);
+    let radius = max(initial_radius_of(density[cell].count, cell_px, depth), MIN_POSITIVE);
     return Splat(pixel_vertex(pixel, vertex, mask_depth(depth)), vec4f(point.position_view, radius));
 }
 

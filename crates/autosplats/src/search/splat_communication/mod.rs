@@ -19,7 +19,7 @@
 //! 3. `count` and `decide`: if 99.9 % have converged (t_conv), the arguments of the indirect draws become 0. The rest
 //!    of the [`ITERATIONS`](gpu::ITERATIONS) recorded iterations then cost next to nothing. Nothing is read back.
 //!
-//! The next distribution reads the gathered counts and moves a and b (`shared/radius_search.wgsl`). With fewer than k
+//! The next distribution reads the gathered counts and moves a and b (`imports/radius_search.wgsl`). With fewer than k
 //! neighbours b expands by α = √(k/σ). Otherwise the two counters around k are the new bracket, until one equals k.
 //! Each point's own fragment hands the bounds on between T_F and T_R2, in the colours, which are added where alpha
 //! takes the maximum. A converged point draws only that one pixel. A point that is no query draws only its answers.

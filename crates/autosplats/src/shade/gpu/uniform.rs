@@ -2,27 +2,28 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::cpu::{ENCODE_STEPS, Scene, darkening, given_light, sample_step, shows_colors};
-use super::super::edges::{EDGE_SEARCH_PX, Edges, MIN_TILT_LOSS};
-use super::super::light::{CLAY, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY};
-use super::super::occlusion::{FARTHEST_RISE, MAX_FULL_RISE, MIN_RISE, PAIR_COUNT, pairs};
+use super::super::cpu::{Scene, darkening, given_light, sample_step, shows_colors};
+use super::super::edges::Edges;
+use super::super::occlusion::{PAIR_COUNT, Pair, pairs};
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
+use crate::gpu::indices;
 use crate::splat::{Channels, LayerBuffers};
 
-/// What colours a surface, numbered as in `shared/shading.wgsl`; from [`Height`](Self::Height) on these are values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the colour modes, resolved")]
-pub(crate) enum ShownQuantity {
-    Clay,
-    Color,
-    Normal,
-    Height,
-    Depth,
-    Radius,
-    KRadius,
-    Curvature,
-    Scalar,
+indices! {
+    /// What colours a surface; from [`Height`](Self::Height) on these are values.
+    #[allow(missing_docs, reason = "the colour modes, resolved")]
+    pub(crate) enum ShownQuantity in "Show" {
+        Clay,
+        Color,
+        Normal,
+        Height,
+        Depth,
+        Radius,
+        KRadius,
+        Curvature,
+        Scalar,
+    }
 }
 
 impl ShownQuantity {
@@ -41,28 +42,16 @@ impl ShownQuantity {
     }
 }
 
-/// Settings and constants of shading, in the layout of `shared/shading.wgsl`.
+/// Settings of shading, in the layout of `imports/shading.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ShadeUniform {
-    pub(crate) key: [f32; 3],
-    pub(crate) key_wrap: f32,
-    pub(crate) key_light: [f32; 3],
-    pub(crate) shoulder: f32,
-    pub(crate) fill: [f32; 3],
-    pub(crate) darkening: f32,
-    pub(crate) fill_light: [f32; 3],
-    pub(crate) steepest: f32,
-    pub(crate) ground: [f32; 3],
-    pub(crate) furthest: f32,
-    pub(crate) sky: [f32; 3],
-    pub(crate) least_rise: f32,
-    pub(crate) clay: [f32; 3],
-    pub(crate) edge_factor: f32,
     pub(crate) up: [f32; 3],
-    pub(crate) edge_offset: f32,
+    pub(crate) darkening: f32,
     pub(crate) given_light: [f32; 2],
     pub(crate) range: [f32; 2],
+    pub(crate) edge_factor: f32,
+    pub(crate) edge_offset: f32,
     pub(crate) find_range: u32,
     pub(crate) lighting: u32,
     pub(crate) keep_linear: u32,
@@ -70,12 +59,19 @@ pub(crate) struct ShadeUniform {
     pub(crate) pitch: u32,
     pub(crate) sample_step: u32,
     pub(crate) samples: u32,
-    pub(crate) encode_steps: u32,
     pub(crate) backgrounds: u32,
     pub(crate) measures: u32,
-    pub(crate) edge_search: i32,
-    pub(crate) less_tilted: f32,
-    pub(crate) pairs: [[f32; 4]; PAIR_COUNT],
+    pub(crate) padding: u32,
+    pub(crate) pairs: [ShadePair; PAIR_COUNT],
+}
+
+/// A [`Pair`] of pixels, laid out as in `imports/shading.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ShadePair {
+    pub(crate) step: [f32; 2],
+    pub(crate) inverse_px: f32,
+    pub(crate) part: f32,
 }
 
 /// Whether the range has to be found from the values.
@@ -92,24 +88,12 @@ impl ShadeUniform {
         let colored = ShownQuantity::new(&shading.color, layers.channels) == ShownQuantity::Color;
         let edges = Edges::new(scene.view);
         Self {
-            key: KEY.to_array(),
-            key_wrap: KEY_WRAP,
-            key_light: KEY_LIGHT,
-            shoulder: SHOULDER,
-            fill: FILL.to_array(),
-            darkening: darkening(shading, colored),
-            fill_light: FILL_LIGHT,
-            steepest: MAX_FULL_RISE,
-            ground: GROUND,
-            furthest: FARTHEST_RISE,
-            sky: SKY,
-            least_rise: MIN_RISE,
-            clay: CLAY,
-            edge_factor: edges.factor,
             up: scene.up.as_vec3().to_array(),
-            edge_offset: edges.offset,
+            darkening: darkening(shading, colored),
             given_light: given_light(scene, shading, colored),
             range: scene.given_range(shading).unwrap_or_default(),
+            edge_factor: edges.factor,
+            edge_offset: edges.offset,
             find_range: finds_range(shading).into(),
             lighting: shading.lighting.into(),
             keep_linear: keep_linear.into(),
@@ -117,14 +101,12 @@ impl ShadeUniform {
             pitch: pitch(width),
             sample_step: step as u32,
             samples: pixels.div_ceil(step) as u32,
-            encode_steps: ENCODE_STEPS as u32,
             backgrounds: encode_words() as u32,
             measures: if layers.channels.color { layers.size.iter().product() } else { 0 },
-            edge_search: EDGE_SEARCH_PX as i32,
-            less_tilted: MIN_TILT_LOSS,
-            pairs: pairs(height).map(|pair| {
-                let [dx, dy] = pair.step.map(|side| side as f32);
-                [dx, dy, pair.inverse_px, pair.part]
+            padding: 0,
+            pairs: pairs(height).map(|Pair { step, inverse_px, part }| {
+                let step = step.map(|side| side as f32);
+                ShadePair { step, inverse_px, part }
             }),
         }
     }

@@ -3,15 +3,22 @@
 
 use super::{MAX_SAME_DEPTH_PX, MIN_SEEN_WEIGHT, PAST_SHARE};
 use crate::Error;
-use crate::gpu::{Gpu, Pass, PassSource, Step};
+use crate::gpu::{Gpu, Library, Pass, Step, constants, passes};
 use crate::shade::cpu::ENCODE_STEPS;
-use crate::shade::gpu::{ROW_PIXELS, ShadeBuffers};
+use crate::shade::gpu::{self, ROW_PIXELS, ShadeBuffers};
 use crate::splat::LayerBuffers;
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[OVER_TIME, KEEP_PICTURE];
-const OVER_TIME: PassSource = PassSource::new("shade/over_time/over_time", include_str!("over_time.wgsl"));
-const KEEP_PICTURE: PassSource = PassSource::new("shade/over_time/keep_picture", include_str!("keep_picture.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: gpu::LIBRARY.files,
+    constants: &[constants![ENCODE_STEPS, MAX_SAME_DEPTH_PX, MIN_SEEN_WEIGHT, PAST_SHARE, ROW_PIXELS]],
+};
+
+passes! {
+    "shade/over_time", LIBRARY;
+    OVER_TIME = "over_time",
+    KEEP_PICTURE = "keep_picture",
+}
 
 /// Invocations in a workgroup.
 const GROUP: u32 = 256;
@@ -52,15 +59,8 @@ impl PictureOverTimePasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        let row_pixels = ("ROW_PIXELS", ROW_PIXELS.into());
-        let average = [
-            ("PAST_SHARE", PAST_SHARE.into()),
-            ("MAX_SAME_DEPTH_PX", MAX_SAME_DEPTH_PX.into()),
-            ("MIN_SEEN_WEIGHT", MIN_SEEN_WEIGHT.into()),
-            ("ENCODE_STEPS", ENCODE_STEPS as f64),
-            row_pixels,
-        ];
-        Ok(Self { average: Pass::new(gpu, &OVER_TIME, &average)?, keep: Pass::new(gpu, &KEEP_PICTURE, &[row_pixels])? })
+        let pass = |source| Pass::new(gpu, source, &[]);
+        Ok(Self { average: pass(&OVER_TIME)?, keep: pass(&KEEP_PICTURE)? })
     }
 
     /// Averages a shaded picture with the last one, and keeps the result.

@@ -3,17 +3,14 @@
 // Reads: surface, image. Writes: past_depths, past_image.
 
 #import frame
-#import picture
-#import groups
 #import divide
+#import groups
+#import picture
 
 @group(0) @binding(1) var<storage, read> surface: array<vec4f>;
 @group(0) @binding(2) var<storage, read> image: array<u32>;
 @group(0) @binding(3) var<storage, read_write> past_depths: array<f32>;
 @group(0) @binding(4) var<storage, read_write> past_image: array<u32>;
-
-// Alignment of the image's rows in pixels.
-override ROW_PIXELS: u32;
 
 @compute @workgroup_size(256)
 fn keep_picture(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {

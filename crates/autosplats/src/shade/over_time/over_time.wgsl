@@ -3,9 +3,9 @@
 // Reads: surface, past_depths, past_image, tables. Reads and writes: image.
 
 #import frame
-#import picture
-#import groups
 #import divide
+#import groups
+#import picture
 #import reproject
 #import srgb
 
@@ -15,13 +15,6 @@
 // Table from linear light to sRGB, four steps to a word.
 @group(0) @binding(4) var<storage, read> tables: array<u32>;
 @group(0) @binding(5) var<storage, read_write> image: array<u32>;
-
-override PAST_SHARE: f32;
-override MAX_SAME_DEPTH_PX: f32;
-override MIN_SEEN_WEIGHT: f32;
-override ENCODE_STEPS: u32;
-// Alignment of the image's rows in pixels.
-override ROW_PIXELS: u32;
 
 // A pixel's channels in linear light.
 fn linear_of(rgba: u32) -> vec3f {

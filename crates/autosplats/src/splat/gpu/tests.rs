@@ -3,7 +3,6 @@
 use autosplats_cloud::FieldValues;
 use glam::Vec3;
 
-use super::super::layers::COVER_BYTES;
 use super::super::tests::{ALL_DISCS, Data, Discs, sixteenths, surfels, views};
 use super::super::{Attributes, GBuffer, PointColors, Splatter, TILE_AREA, TrimRules};
 use super::*;
@@ -11,8 +10,8 @@ use crate::adapt::Noise;
 use crate::camera::View;
 use crate::fit::Surfel;
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
-use crate::project::gpu::COUNTERS;
 use crate::project::gpu::tests::find_work;
+use crate::project::gpu::{COUNTERS, DensityCell};
 use crate::project::{DensityGrid, ScreenPoint};
 use crate::test_clouds::Random;
 
@@ -95,8 +94,8 @@ impl Scene<'_> {
         set_counter(gpu, screen, Counter::Recovered, self.surfels.len() - self.active);
         visibility(Round::Recovered);
         let before = depth();
-        let Noise { level, power, most, sure } = self.noise;
-        let noise = gpu.storage_with("noise", &[level, power, 0.0, 0.0, most, sure]).expect("room");
+        let statistics = FrameStatistics { noise: self.noise, k_radius: 0.0, sheet_level: 0 };
+        let noise = gpu.storage_with("noise", &[statistics]).expect("room");
         let rules = LayerRules { depth_refinement: self.refinement, trim: true, noise: Some(&noise) };
         run(passes.steps_layers(gpu, frame, screen, surfels, splats, layers, rules));
         Drawn { depth: [before, depth()], layers: read_layers(gpu, layers) }
@@ -355,22 +354,6 @@ fn layers_that_are_not_wanted_change_no_other() {
 }
 
 #[test]
-fn structs_have_the_sizes_that_the_host_thinks() {
-    let sizes: Vec<(String, u32)> = ATTRIBUTES
-        .module()
-        .types
-        .iter()
-        .filter_map(|(_, ty)| match ty.inner {
-            wgpu::naga::TypeInner::Struct { span, .. } => Some((ty.name.clone()?, span)),
-            _ => None,
-        })
-        .collect();
-    for (name, size) in [("Splat", SPLAT_BYTES), ("Surfel", size_of::<Surfel>()), ("Cover", COVER_BYTES)] {
-        assert!(sizes.contains(&(name.into(), size as u32)), "{name} is not {size} bytes: {sizes:?}");
-    }
-}
-
-#[test]
 fn hidden_points_are_not_recovered() {
     let Some(gpu) = test_gpu() else { return };
     let data = Data::new(5000);
@@ -395,7 +378,8 @@ fn hidden_points_are_not_recovered() {
     screen.queries = gpu.storage::<u32>("queries", 5000).expect("room");
     // One density cell holds all points.
     let density = DensityGrid { cell_px: 200, columns: 1, count: vec![1500], ..DensityGrid::default() };
-    screen.density = gpu.storage_with("density", &[density.count[0], 0]).expect("room");
+    screen.density =
+        gpu.storage_with("density", &[DensityCell { count: density.count[0], nearest: 0.0 }]).expect("room");
     set_counter(&gpu, screen, Counter::CellPx, density.cell_px);
     set_counter(&gpu, screen, Counter::CellColumns, density.columns);
     set_counter(&gpu, screen, Counter::Active, 500);

@@ -4,15 +4,27 @@
 use super::points::{Fitted, MIN_SURFACE_COSINE};
 use super::surfaces::MAX_SURFACE_DISTANCE_RADII;
 use crate::Error;
-use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::{Round, ScreenBuffers, Work};
+use crate::fit::Surfel;
+use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
+use crate::project::gpu::{Counter, Round, ScreenBuffers, Work};
 use crate::splat::LayerBuffers;
 use crate::splat::gpu::CLEAR_WORDS;
 
-#[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[OVER_TIME, KEEP_FITTED];
-const OVER_TIME: PassSource = PassSource::new("splat/over_time/over_time", include_str!("over_time.wgsl"));
-const KEEP_FITTED: PassSource = PassSource::new("splat/over_time/keep_fitted", include_str!("keep_fitted.wgsl"));
+/// Imports and constants of the passes.
+const LIBRARY: Library = Library {
+    files: &[files!["fitted"]],
+    constants: &[
+        Counter::CONSTANTS,
+        constants!(in Surfel: BACK, LINE),
+        constants![MAX_SURFACE_DISTANCE_RADII, MIN_SURFACE_COSINE],
+    ],
+};
+
+passes! {
+    "splat/over_time", LIBRARY;
+    OVER_TIME = "over_time",
+    KEEP_FITTED = "keep_fitted",
+}
 
 /// State that the last frame leaves for the next one.
 #[derive(Debug)]
@@ -55,14 +67,7 @@ impl OverTimePasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        let smooth = |round: Round| {
-            let constants = [
-                ("ROUND", f64::from(round as u32)),
-                ("MAX_SURFACE_DISTANCE_RADII", MAX_SURFACE_DISTANCE_RADII.into()),
-                ("MIN_SURFACE_COSINE", MIN_SURFACE_COSINE.into()),
-            ];
-            Pass::new(gpu, &OVER_TIME, &constants)
-        };
+        let smooth = |round: Round| Pass::new(gpu, &OVER_TIME, &[round.constant()]);
         Ok(Self {
             smooth: [smooth(Round::Active)?, smooth(Round::Recovered)?],
             clear: Pass::new(gpu, &CLEAR_WORDS, &[])?,

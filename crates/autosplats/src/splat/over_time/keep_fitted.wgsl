@@ -3,12 +3,11 @@
 // Reads: counters, points, surfels, frames. Writes: fitted, halves (cleared to 0 first).
 
 #import frame
+#import fitted
 #import groups
-#import counters
+#import half
 #import screen
 #import surfel
-#import half
-#import fitted
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> points: array<ScreenPoint>;

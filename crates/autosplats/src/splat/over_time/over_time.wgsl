@@ -4,14 +4,14 @@
 // Writes: frames.
 
 #import frame
+#import fitted
 #import groups
-#import counters
+#import half
+#import moved
+#import reproject
+#import round
 #import screen
 #import surfel
-#import moved
-#import half
-#import reproject
-#import fitted
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> surface: array<vec4f>;
@@ -20,11 +20,6 @@
 @group(0) @binding(5) var<storage, read> fitted: array<Fitted>;
 @group(0) @binding(6) var<storage, read_write> surfels: array<Surfel>;
 @group(0) @binding(7) var<storage, read_write> frames: array<f32>;
-
-// 0: the active points; 1: the recovered ones, which follow them.
-override ROUND: u32;
-override MAX_SURFACE_DISTANCE_RADII: f32;
-override MIN_SURFACE_COSINE: f32;
 
 // Moves a surfel to `center` and turns it by `share` of the way towards `before`, a normal on the same side.
 fn draw_to(place: u32, center: vec3f, before: vec3f, share: f32) {

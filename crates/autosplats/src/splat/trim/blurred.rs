@@ -74,13 +74,13 @@ pub(in crate::splat) const MIN_WINDOW_SIXTEENTHS: u32 = 12;
 /// Width of a fringe in multiples of the noise, beside the reach of its splats.
 pub(in crate::splat) const FRINGE_NOISES: f32 = 3.0;
 /// Largest width of a fringe, in blocks.
-pub(crate) const FRINGE_BLOCKS: usize = 16;
+pub(in crate::splat) const FRINGE_BLOCKS: usize = 16;
 /// Share of the limit that the mean has to exceed half way to the empty pixel.
 pub(in crate::splat) const HALF_WAY_OFFSET_SHARE: f32 = 0.7;
 /// Distance beyond the fringe, in blocks, up to which empty blocks define the direction to the empty side.
 pub(in crate::splat) const BLOCKS_BEYOND_FRINGE: f32 = 2.0;
 /// Side of a block in pixels.
-pub(crate) const BLOCK_PX: usize = 4;
+pub(in crate::splat) const BLOCK_PX: usize = 4;
 
 const _: () = assert!(BLOCK_PX == 4, "pairs of pairs of pixels are blocks");
 /// Blocks along the side of a tile.

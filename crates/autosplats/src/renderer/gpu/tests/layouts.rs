@@ -1,21 +1,21 @@
-//! Structs and constants have the same layouts and values in Rust and WGSL.
+//! Structs have the same layouts in Rust and WGSL.
 
 use std::mem::offset_of;
 
-use wgpu::naga::{self, Expression, Literal, Module, TypeInner};
+use wgpu::naga::{self, Module, TypeInner};
 
 use super::passes;
-use crate::adapt::gpu::tests::BUNCH;
-use crate::adapt::{DepthRun, SCALES, SHEETS, SLABS};
+use crate::adapt::gpu::Asked;
+use crate::adapt::{DepthRun, FrameStatistics, Noise};
 use crate::fit::Surfel;
 use crate::fit::orient::Sensor;
-use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
-use crate::project::gpu::{COUNTERS, Counter, RANK_BLOCK_FLAGS, Work};
+use crate::gpu::{FrameUniform, PassSource};
+use crate::project::gpu::DensityCell;
 use crate::project::{ChunkUniform, ScreenPoint};
 use crate::search::splat_communication::gpu::Arguments;
-use crate::shade::gpu::{ShadeUniform, ShownQuantity};
+use crate::shade::gpu::{ShadePair, ShadeUniform};
+use crate::splat::Cover;
 use crate::splat::over_time::Fitted;
-use crate::splat::{BLOCK_PX, Cover, FRINGE_BLOCKS};
 
 /// Name, offset and size of a field.
 type Field = (String, usize, usize);
@@ -44,7 +44,7 @@ macro_rules! mirrored {
     }};
 }
 
-fn mirrored() -> [Mirrored; 10] {
+fn mirrored() -> [Mirrored; 16] {
     [
         mirrored!(
             "Frame",
@@ -84,6 +84,12 @@ fn mirrored() -> [Mirrored; 10] {
         mirrored!("Cover", Cover { weight, rim, point, scalar }),
         mirrored!("Sensor", Sensor { position, first }),
         mirrored!("DepthRun", DepthRun { position, first, axis, factor, power, padding }),
+        mirrored!("Noise", Noise { level, power, most, sure }),
+        mirrored!("FrameStatistics", FrameStatistics { noise, k_radius, sheet_level }),
+        mirrored!("Asked", Asked { count, k_radii, point }),
+        mirrored!("DensityCell", DensityCell { count, nearest }),
+        mirrored!("CountedCell", DensityCell { count, nearest }),
+        mirrored!("ShadePair", ShadePair { step, inverse_px, part }),
         mirrored!("ScreenPoint", ScreenPoint { position_view, pixel }),
         mirrored!(
             "Surfel",
@@ -104,24 +110,12 @@ fn mirrored() -> [Mirrored; 10] {
         mirrored!(
             "ShadeUniform",
             ShadeUniform {
-                key,
-                key_wrap,
-                key_light,
-                shoulder,
-                fill,
-                darkening,
-                fill_light,
-                steepest,
-                ground,
-                furthest,
-                sky,
-                least_rise,
-                clay,
-                edge_factor,
                 up,
-                edge_offset,
+                darkening,
                 given_light,
                 range,
+                edge_factor,
+                edge_offset,
                 find_range,
                 lighting,
                 keep_linear,
@@ -129,25 +123,13 @@ fn mirrored() -> [Mirrored; 10] {
                 pitch,
                 sample_step,
                 samples,
-                encode_steps,
                 backgrounds,
                 measures,
-                edge_search,
-                less_tilted,
+                padding,
                 pairs,
             }
         ),
     ]
-}
-
-/// All passes, and the shared files that no pass needs to import.
-fn modules() -> Vec<Module> {
-    let shared = ["#import surfel\n", "#import counters\n", "#import rank\n", "#import groups\n"];
-    passes().map(PassSource::module).chain(shared.map(parse)).collect()
-}
-
-fn parse(source: &str) -> Module {
-    naga::front::wgsl::parse_str(&link(source)).expect("WGSL")
 }
 
 /// Size and fields of a struct.
@@ -164,30 +146,9 @@ fn layout(module: &Module, name: &str) -> Option<(usize, Vec<Field>)> {
     })
 }
 
-/// Names and values of the `u32` constants of a module.
-fn constants(module: &Module) -> Vec<(String, u32)> {
-    let constant = |constant: &naga::Constant| match module.global_expressions[constant.init] {
-        Expression::Literal(Literal::U32(value)) => Some((constant.name.clone()?, value)),
-        _ => None,
-    };
-    module.constants.iter().filter_map(|(_, value)| constant(value)).collect()
-}
-
-fn constant(source: &str, name: &str) -> u32 {
-    let constants = constants(&parse(source));
-    constants.into_iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no {name}")).1
-}
-
-/// WGSL's name of an enum's variant: `NotFinite` is `NOT_FINITE`.
-fn screaming(variant: &impl std::fmt::Debug) -> String {
-    let name = format!("{variant:?}");
-    let words = name.char_indices().map(|(at, c)| if at > 0 && c.is_uppercase() { format!("_{c}") } else { c.into() });
-    words.collect::<String>().to_uppercase()
-}
-
 #[test]
 fn structs_lie_alike_in_rust_and_wgsl() {
-    let modules = modules();
+    let modules: Vec<_> = passes().map(PassSource::module).collect();
     for Mirrored { name, size, fields } in mirrored() {
         let found: Vec<_> = modules.iter().filter_map(|module| layout(module, name)).collect();
         assert!(!found.is_empty(), "no pass has a struct {name}");
@@ -199,85 +160,33 @@ fn structs_lie_alike_in_rust_and_wgsl() {
 }
 
 #[test]
-fn a_shifted_field_is_found() {
-    let module = parse("struct Surfel { center: vec3f, normal: vec3f }");
-    let (_, members) = layout(&module, "Surfel").expect("a struct");
-    let expected = [("center".to_owned(), 0, 12), ("normal".to_owned(), 16, 12)];
-    assert_eq!(members, expected, "vectors of three are aligned to four");
+fn buffers_have_room_for_structs() {
+    use crate::search::{kd_tree, screen_grid};
+    use crate::{adapt, splat};
+    let rooms = [
+        (adapt::gpu::PASSES, adapt::gpu::SIZES),
+        (kd_tree::gpu::PASSES, kd_tree::gpu::SIZES),
+        (screen_grid::gpu::PASSES, screen_grid::gpu::SIZES),
+        (splat::gpu::PASSES, splat::gpu::SIZES),
+    ];
+    for (passes, sizes) in rooms {
+        let modules: Vec<_> = passes.iter().map(PassSource::module).collect();
+        for &(name, size) in sizes {
+            let spans: Vec<_> =
+                modules.iter().filter_map(|module| layout(module, name)).map(|(span, _)| span).collect();
+            assert!(
+                !spans.is_empty() && spans.iter().all(|&span| span == size),
+                "{name}: {spans:?} in WGSL, {size} in Rust"
+            );
+        }
+    }
 }
 
 #[test]
-fn constants_are_alike_in_rust_and_wgsl() {
-    use Counter::{
-        Active, Behind, Blocks, Bounded, CellColumns, CellPx, Clamped, Covered, Large, LeftActive, LeftRecovered,
-        NotFinite, Outliers, Outside, Passive, RangeHigh, RangeLow, Recovered, StripPx, Visible,
-    };
-    let counters: [Counter; COUNTERS] = [
-        NotFinite,
-        Behind,
-        Outside,
-        Visible,
-        Blocks,
-        StripPx,
-        CellPx,
-        CellColumns,
-        Active,
-        Passive,
-        Recovered,
-        Clamped,
-        Bounded,
-        Outliers,
-        RangeLow,
-        RangeHigh,
-        Covered,
-        Large,
-        LeftActive,
-        LeftRecovered,
-    ];
-    let counters = counters.map(|counter| (screaming(&counter), counter as u32));
-    assert_eq!(constants(&parse("#import counters\n")), counters, "counters in WGSL, and in Rust");
-
-    use ShownQuantity::{Clay, Color, Curvature, Depth, Height, KRadius, Normal, Radius, Scalar};
-    let shown = [Clay, Color, Normal, Height, Depth, Radius, KRadius, Curvature, Scalar];
-    let shown = shown.map(|shown| (format!("SHOW_{}", screaming(&shown)), shown as u32));
-    let shading = passes().find(|pass| pass.path == "shade/shade").expect("a pass").module();
-    let in_wgsl: Vec<_> = constants(&shading).into_iter().filter(|(name, _)| name.starts_with("SHOW_")).collect();
-    assert_eq!(in_wgsl, shown, "what is shown in WGSL, and in Rust");
-
-    use Work::{
-        Active64, Active256, ActiveFew, LargeSplats, LeftActive64, LeftRecovered64, PassiveBlocks, Queries256,
-        Recovered64, Recovered256, RecoveredFew, Visible256, VisibleBlocks,
-    };
-    let works = [
-        Visible256,
-        VisibleBlocks,
-        PassiveBlocks,
-        Active64,
-        Active256,
-        Recovered64,
-        Recovered256,
-        Queries256,
-        LargeSplats,
-        LeftActive64,
-        LeftRecovered64,
-        ActiveFew,
-        RecoveredFew,
-    ];
-    let works = works.map(|work| (screaming(&work), work as u32));
-    let pass = passes().find(|pass| pass.path == "project/work").expect("a pass").module();
-    let in_wgsl: Vec<_> = constants(&pass).into_iter().filter(|entry| works.contains(entry)).collect();
-    assert_eq!(in_wgsl, works, "work in WGSL, and in Rust");
-
-    let flags = ["BACK", "LINE"].map(|flag| constant("#import surfel\n", flag));
-    assert_eq!(flags, [Surfel::BACK, Surfel::LINE], "flags of a surfel");
-    assert_eq!(constant("#import frame\n#import blocks\n", "BLOCK_PX"), BLOCK_PX as u32, "side of a block");
-    let trim = passes().find(|pass| pass.path == "splat/trim").expect("a pass");
-    assert_eq!(constant(trim.source, "FRINGE_BLOCKS"), FRINGE_BLOCKS as u32, "blocks of a fringe");
-    assert_eq!(constant("#import levels\n", "SLABS"), SLABS as u32, "slabs of a cell");
-    assert_eq!(constant("#import levels\n", "BUNCH"), BUNCH as u32, "clusters side by side");
-    assert_eq!(constant("#import sheet\n", "SHEETS"), SHEETS as u32, "sheets of a cell");
-    let adapt = passes().find(|pass| pass.path == "adapt/adapt").expect("a pass");
-    assert_eq!(constant(adapt.source, "SCALES"), SCALES as u32, "balls around a point");
-    assert_eq!(constant("#import rank\n", "RANK_WORDS") * 32, RANK_BLOCK_FLAGS, "flags that a workgroup ranks");
-    assert_eq!(constant("#import groups\n", "GROUPS_PER_ROW"), GROUPS_PER_ROW, "workgroups in a row");
+fn a_shifted_field_is_found() {
+    let source = "struct Surfel { center: vec3f, normal: vec3f }";
+    let module = naga::front::wgsl::parse_str(source).expect("WGSL");
+    let (_, members) = layout(&module, "Surfel").expect("a struct");
+    let expected = [("center".to_owned(), 0, 12), ("normal".to_owned(), 16, 12)];
+    assert_eq!(members, expected, "vectors of three are aligned to four");
 }

@@ -4,12 +4,9 @@
 
 #import frame
 #import groups
-#import put_work
-#import half
-#import project_point
-#import range_keys
 #import kd_build
-#import kd_work
+#import project_point
+#import put_work
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> positions: array<f32>;
@@ -17,7 +14,7 @@
 @group(0) @binding(4) var<storage, read_write> radii: array<f32>;
 @group(0) @binding(5) var<storage, read_write> large: array<KdLarge>;
 @group(0) @binding(6) var<storage, read_write> state: KdState;
-@group(0) @binding(7) var<storage, read_write> arguments: array<u32>;
+@group(0) @binding(7) var<storage, read_write> arguments: array<Dispatch>;
 
 @compute @workgroup_size(256)
 fn begin(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -29,7 +26,7 @@ fn begin(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         radii[at] = -1.0;
     }
     if at == 0u {
-        let chunks = (chunk.len + KD_CHUNK - 1u) / KD_CHUNK;
+        let chunks = (chunk.len + CHUNK_POINTS - 1u) / CHUNK_POINTS;
         large[0] = KdLarge(0u, 0u, chunk.len, 0u, vec3u(0u), KD_UNSPLIT, vec3u(0u), 0.0, chunk.len, 0u, KD_NONE, KD_NONE);
         state = KdState(0u, 1u, 1u, chunks, 0u, 0u);
         put_work(WORK_LARGE, 1u, 64u);

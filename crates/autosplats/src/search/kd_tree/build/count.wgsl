@@ -3,7 +3,6 @@
 // Reads: state, large, points. Writes: chunk_sums. One workgroup per chunk of a large node.
 
 #import groups
-#import range_keys
 #import kd_build
 #import kd_chunk
 

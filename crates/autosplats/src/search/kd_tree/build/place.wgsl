@@ -4,12 +4,9 @@
 // Reads: state. Reads and writes: large, chunk_sums. Writes: next_state, next_large, small, nodes, and the arguments
 // of the next level. One workgroup.
 
-#import groups
-#import put_work
-#import range_keys
-#import kd_tree
 #import kd_build
-#import kd_work
+#import kd_tree
+#import put_work
 
 @group(0) @binding(0) var<storage, read> state: KdState;
 @group(0) @binding(1) var<storage, read_write> large: array<KdLarge>;
@@ -18,7 +15,7 @@
 @group(0) @binding(4) var<storage, read_write> next_large: array<KdLarge>;
 @group(0) @binding(5) var<storage, read_write> small: array<KdSmall>;
 @group(0) @binding(6) var<storage, read_write> nodes: array<KdNode>;
-@group(0) @binding(7) var<storage, read_write> arguments: array<u32>;
+@group(0) @binding(7) var<storage, read_write> arguments: array<Dispatch>;
 
 // Sums over runs of nodes: nodes split, large children, their chunks, small children.
 var<workgroup> made: array<vec4u, 257>;
@@ -26,7 +23,7 @@ var<workgroup> made: array<vec4u, 257>;
 var<workgroup> sums: array<u32, 257>;
 
 fn points_left(own: KdLarge) -> u32 {
-    let chunks = (own.len + KD_CHUNK - 1u) / KD_CHUNK;
+    let chunks = (own.len + CHUNK_POINTS - 1u) / CHUNK_POINTS;
     return chunk_sums[own.first_chunk + chunks] - chunk_sums[own.first_chunk];
 }
 
@@ -38,12 +35,12 @@ fn is_split(own: KdLarge, left: u32) -> bool {
 }
 
 fn is_large(len: u32) -> bool {
-    return len > KD_SMALL;
+    return len > MAX_SMALL_NODE_POINTS;
 }
 
 fn child(len: u32) -> vec4u {
     if is_large(len) {
-        return vec4u(0u, 1u, (len + KD_CHUNK - 1u) / KD_CHUNK, 0u);
+        return vec4u(0u, 1u, (len + CHUNK_POINTS - 1u) / CHUNK_POINTS, 0u);
     }
     return vec4u(0u, 0u, 0u, select(0u, 1u, len > 0u));
 }
@@ -134,7 +131,7 @@ fn place(@builtin(local_invocation_index) local: u32) {
         }
         let both = state.nodes + 2u * so_far.x;
         let is_root = own.axis == KD_FINITE_LEFT;
-        nodes[both] = KdNode(vec3f(KD_MAX_F32), 0u, vec3f(-KD_MAX_F32), 1u);
+        nodes[both] = KdNode(vec3f(MAX_F32), 0u, vec3f(-MAX_F32), 1u);
         nodes[both + 1u] = nodes[both];
         nodes[own.node].first = both;
         nodes[own.node].len = 0u;

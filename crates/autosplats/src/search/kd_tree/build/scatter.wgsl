@@ -4,9 +4,9 @@
 // Reads: state, large, chunk_sums, points. Writes: next_points, next_large. One workgroup per chunk of a large node.
 
 #import groups
-#import range_keys
 #import kd_build
 #import kd_chunk
+#import range_keys
 
 @group(0) @binding(0) var<storage, read> state: KdState;
 @group(0) @binding(1) var<storage, read> large: array<KdLarge>;
@@ -19,8 +19,6 @@
 var<workgroup> bits: array<atomic<u32>, 8>;
 // Boxes of the points that each invocation moves left and right: least and negated greatest coordinates.
 var<workgroup> boxes: array<f32, 768>;
-
-const MAX_F32 = 3.4028234663852886e38;
 
 fn bound(place: u32, local: u32, value: vec3f) {
     boxes[place * 64u + local] = value.x;

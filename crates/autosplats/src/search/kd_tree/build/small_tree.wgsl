@@ -12,20 +12,14 @@
 
 #import frame
 #import groups
-#import range_keys
-#import kd_tree
 #import kd_build
+#import kd_tree
 
 @group(0) @binding(1) var<storage, read> state: KdState;
 @group(0) @binding(2) var<storage, read> small: array<KdSmall>;
 @group(0) @binding(3) var<storage, read_write> points_a: array<vec4u>;
 @group(0) @binding(4) var<storage, read> points_b: array<vec4u>;
 @group(0) @binding(5) var<storage, read_write> nodes: array<KdNode>;
-
-// Fewest points of a leaf, where there are more. So the nodes below a small node are at most a quarter of its points.
-override MIN_LEAF_POINTS: u32;
-// Number of points whose reading costs as much as a step down the tree.
-override STEP_COST_POINTS: f32;
 
 // Coordinates of the points, axis by axis.
 var<workgroup> coordinates: array<f32, 192>;

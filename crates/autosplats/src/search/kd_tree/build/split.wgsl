@@ -5,9 +5,9 @@
 // Reads: state, points. Reads and writes: large. Writes: nodes. One invocation per large node.
 
 #import groups
-#import range_keys
-#import kd_tree
 #import kd_build
+#import kd_tree
+#import range_keys
 
 @group(0) @binding(0) var<storage, read> state: KdState;
 @group(0) @binding(1) var<storage, read> points: array<vec4u>;

@@ -1,0 +1,11 @@
+// Which screen points are active: those that matter, unless grid culling postpones them [Paper, §7, Grid Culling].
+
+#import frame
+#import density
+#import matters
+#import screen
+
+fn is_active(point: ScreenPoint, cell: DensityCell, cell_px: u32) -> bool {
+    let is_culled = frame.grid_culling == 1u && point.position_view.z > culling_depth(cell.nearest, cell_px);
+    return matters(point, cell, cell_px) && !is_culled;
+}

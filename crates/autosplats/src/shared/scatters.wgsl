@@ -1,6 +1,0 @@
-// Scatter of a ball's points: bits of a standard deviation in world units, with `THICK` set if it is large relative to
-// the radius. Imports: nothing.
-
-const THICK = 0x80000000u;
-// The ball holds too few clusters for a fit.
-const TOO_FEW = 0xffffffffu;
