@@ -175,10 +175,6 @@ pub(crate) struct Cover {
     pub(crate) scalar: f32,
 }
 
-/// Bytes of a [`Cover`], which the shader's struct must have too.
-#[cfg(test)]
-pub(super) const COVER_BYTES: usize = size_of::<Cover>();
-
 impl LayerBuffers {
     /// Whether the device can bind the buffers of [`new`](Self::new).
     pub(crate) fn has_room(gpu: &Gpu, size: [u32; 2], channels: Channels) -> bool {
