@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::pass::CompiledPasses;
+use super::compiled::CompiledPasses;
 use crate::Error;
 
 /// A device that can render.

@@ -3,7 +3,8 @@
 
 use std::collections::HashSet;
 
-use super::recorder::GROUPS_PER_ROW;
+/// Workgroups in a row of a dispatch. More than 65535 need a second dimension, which `shared/groups.wgsl` undoes.
+pub(super) const GROUPS_PER_ROW: u32 = 32768;
 
 /// Name and text of a WGSL file that others import.
 pub(crate) type File = (&'static str, &'static str);

@@ -5,23 +5,28 @@
 //! [`Step`]s. A frame is the list of all stages' steps, which a [`Recorder`] replays without allocations.
 
 mod buffers;
+mod compiled;
 mod device;
 mod frame;
 mod link;
 mod pass;
 mod raster;
 mod recorder;
+mod source;
+mod step;
 
 pub(crate) use buffers::Readback;
 #[cfg(test)]
 pub(crate) use buffers::read_back;
+pub(crate) use compiled::Pass;
 #[cfg(test)]
 pub(crate) use device::test_gpu;
 pub use device::{AdapterSummary, adapters};
 pub(crate) use device::{Gpu, INT64_ATOMICS};
 pub(crate) use frame::FrameUniform;
 pub(crate) use link::{Constant, File, InWgsl, Library, constants, files, indices, link};
-pub(crate) use pass::{Groups, Pass, PassSource, Step, passes};
 pub(crate) use raster::{DepthMask, Draw, Load, RasterPass, Target, Targets};
 pub use recorder::PassTime;
 pub(crate) use recorder::{Clock, DISPATCH_BYTES, Recorder, stage_ms};
+pub(crate) use source::{PassSource, passes};
+pub(crate) use step::{Groups, Step};

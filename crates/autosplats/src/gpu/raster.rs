@@ -1,7 +1,7 @@
 //! Passes that draw: one WGSL file made into a render pipeline.
 
 use super::Gpu;
-use super::pass::{LinkedSource, PassSource, PipelineParts, Step, StepWork, bind, compilation_options};
+use super::source::{LinkedSource, PassSource, PipelineParts, bind, compilation_options};
 use crate::Error;
 
 /// Format of all colour targets: four numbers per pixel.
@@ -64,8 +64,8 @@ pub(crate) struct RasterPass {
 /// A pass bound to its resources. A buffer holds the number of vertices.
 #[derive(Clone, Debug)]
 pub(crate) struct Draw {
-    path: &'static str,
-    label: String,
+    pub(super) path: &'static str,
+    pub(super) label: String,
     pipeline: wgpu::RenderPipeline,
     bindings: wgpu::BindGroup,
     arguments: wgpu::Buffer,
@@ -84,8 +84,8 @@ pub(crate) struct Targets {
 /// A step that draws.
 #[derive(Clone, Debug)]
 pub(super) struct Raster {
-    targets: Targets,
-    draws: Vec<Draw>,
+    pub(super) targets: Targets,
+    pub(super) draws: Vec<Draw>,
 }
 
 impl RasterPass {
@@ -162,17 +162,6 @@ impl RasterPass {
             arguments: arguments.clone(),
             at,
         }
-    }
-}
-
-impl Targets {
-    /// Draws in this order, as one step with the name of the last draw.
-    ///
-    /// # Panics
-    /// If there is nothing to draw.
-    pub(crate) fn step(self, draws: Vec<Draw>) -> Step {
-        let [.., last] = &draws[..] else { panic!("a step that draws nothing") };
-        Step { path: last.path, label: last.label.clone(), work: StepWork::Raster(Raster { targets: self, draws }) }
     }
 }
 

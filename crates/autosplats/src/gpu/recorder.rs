@@ -4,11 +4,9 @@ use std::time::Instant;
 
 use super::Gpu;
 use super::buffers::map;
-use super::pass::{Groups, Step, StepWork};
+use super::link::GROUPS_PER_ROW;
+use super::step::{Groups, Step, StepWork};
 use crate::Error;
-
-/// Workgroups in a row of a dispatch. More than 65535 need a second dimension, which `shared/groups.wgsl` undoes.
-pub(super) const GROUPS_PER_ROW: u32 = 32768;
 
 /// Bytes of the arguments of an indirect dispatch: `Dispatch` of `shared/put_work.wgsl`.
 pub(crate) const DISPATCH_BYTES: u64 = size_of::<wgpu::util::DispatchIndirectArgs>() as u64;

@@ -297,8 +297,11 @@ impl CpuFrame<'_> {
         let Self { cloud, settings: Settings { shading, all_layers, .. }, .. } = self;
         let exposure = exposure.of(cloud, shading);
         let scene = Scene { view: &self.picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
-        let following = self.rules.averaged.map(|_| last_picture.following(self.picture));
-        self.value_range = shade(splatter.last(), &scene, shading, *all_layers, following, image, self.cancel);
+        let layers = splatter.last();
+        let mut following = self.rules.averaged.map(|_| last_picture.following(self.picture));
+        let mut average = following.as_mut().map(|following| |image: &mut Image| following.average(layers, image));
+        let average = average.as_mut().map(|average| average as &mut dyn FnMut(&mut Image));
+        self.value_range = shade(layers, &scene, shading, *all_layers, average, image, self.cancel);
     }
 
     /// Makes the frame the last one.

@@ -20,6 +20,7 @@
 //!   then lies further out, as density does not rise eightfold in a step. Before it returns a k-th neighbour, it checks
 //!   that the next step holds at most [`MAX_CANDIDATES`] points. Splat communication limits its iterations instead.
 
+pub(crate) mod engine;
 pub(crate) mod gpu;
 pub(crate) mod kd_tree;
 pub(crate) mod moments;

@@ -1,17 +1,15 @@
 //! Shading on the CPU, row by row.
 
-use std::sync::LazyLock;
-
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::color_map::Scale;
 use super::depths::{Depths, LANES};
 use super::edges::{EDGE_SEARCH_PX, Edges, INNER_NORMAL_PX, MIN_TILT_LOSS};
+use super::encode::{background, encode, encode_table};
 use super::light::{CLAY, SCANNED_LIGHT, light, tone};
 use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
-use super::over_time::PictureInProgress;
-use super::{Background, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
+use super::{ColorMode, Image, Shading, legend, linear, linear_steps};
 use crate::camera::View;
 use crate::cancel::Cancel;
 use crate::splat::GBuffer;
@@ -21,9 +19,6 @@ pub(super) const BACK_LIGHT: f32 = 0.5;
 pub(super) const BACK_COLOR: f32 = 0.4;
 /// Weights of red, green and blue in the brightness of a linear colour.
 pub(super) const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
-/// Steps of the table from linear to 8-bit sRGB. At the dark end, where sRGB is steepest, a step of the table is less
-/// than one of the 255.
-pub(super) const ENCODE_STEPS: usize = 1 << 13;
 /// Least rows that a thread shades at a time; occlusion that reaches further raises the number.
 const BAND_ROWS: usize = 32;
 /// Largest number of pixels sampled to find the usual range of values.
@@ -61,14 +56,14 @@ impl Scene<'_> {
     }
 }
 
-/// Shades `layers` into `image`, also in linear light if `keep_linear`, and averages it with the last picture if
-/// `following`. Returns the range of the colour map in world values, if the colour mode has one.
+/// Shades `layers` into `image`, also in linear light if `keep_linear`. `average` then mixes the last picture in, before
+/// the legend is drawn. Returns the range of the colour map in world values, if the colour mode has one.
 pub(crate) fn shade(
     layers: &GBuffer,
     scene: &Scene<'_>,
     shading: &Shading,
     keep_linear: bool,
-    following: Option<PictureInProgress<'_>>,
+    average: Option<&mut dyn FnMut(&mut Image)>,
     image: &mut Image,
     cancel: &Cancel<'_>,
 ) -> Option<[f64; 2]> {
@@ -98,8 +93,8 @@ pub(crate) fn shade(
             }
         });
     }
-    if let Some(following) = following {
-        following.average(layers, image);
+    if let Some(average) = average {
+        average(image);
     }
     if let (true, Some(scale)) = (shading.legend, &shader.scale) {
         let encode = |channel| encode(inks.table, channel);
@@ -340,32 +335,4 @@ pub(super) fn sample_step(pixels: usize) -> usize {
 /// Whether a colour mode shows the points' colours where there are any.
 pub(super) fn shows_colors(mode: &ColorMode) -> bool {
     matches!(mode, ColorMode::Auto | ColorMode::Rgb | ColorMode::Classification)
-}
-
-/// The background at height `t` of the picture, 0 at the top to 1 at the bottom.
-pub(super) fn background(background: Background, t: f32) -> [u8; 4] {
-    match background {
-        Background::Transparent => [0; 4],
-        Background::Color([r, g, b]) => [r, g, b, 255],
-        Background::Gradient(top, bottom) => {
-            let [r, g, b] = [0, 1, 2].map(|i| {
-                let [top, bottom] = [f32::from(top[i]), f32::from(bottom[i])];
-                (top + (bottom - top) * t).round() as u8
-            });
-            [r, g, b, 255]
-        }
-    }
-}
-
-/// The sRGB channel of a linear one.
-pub(super) fn encode(table: &[u8], channel: f32) -> u8 {
-    table[(channel.clamp(0.0, 1.0) * ENCODE_STEPS as f32 + 0.5) as usize]
-}
-
-/// 8-bit sRGB channels of linear ones from 0 to 1.
-pub(super) fn encode_table() -> &'static [u8] {
-    static TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
-        (0..=ENCODE_STEPS).map(|step| (srgb(step as f32 / ENCODE_STEPS as f32) * 255.0).round() as u8).collect()
-    });
-    &TABLE
 }

@@ -11,7 +11,8 @@ pub(crate) use uniform::ShadePair;
 pub(crate) use uniform::{ShadeUniform, ShownQuantity, finds_range};
 
 use super::color_map::{self, table};
-use super::cpu::{self, ENCODE_STEPS, LUMINANCE, background, encode_table, sample_step};
+use super::cpu::{self, LUMINANCE, sample_step};
+use super::encode::{ENCODE_STEPS, background, encode_table};
 use super::light::{FILL, KEY};
 use super::{Background, ColorMap, Shading, edges, light, occlusion};
 use crate::Error;
@@ -25,11 +26,17 @@ pub(super) const LIBRARY: Library = Library {
     constants: &[
         Counter::CONSTANTS,
         ShownQuantity::CONSTANTS,
-        constants!(in cpu: BACK_COLOR, BACK_LIGHT, ENCODE_STEPS),
+        constants!(in cpu: BACK_COLOR, BACK_LIGHT),
         constants!(in edges: EDGE_SEARCH_PX, INNER_NORMAL_PX, MIN_TILT_LOSS),
         constants!(in light: CLAY, FILL_LIGHT, GROUND, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY),
         constants!(in occlusion: FARTHEST_RISE, MAX_FULL_RISE, MIN_RISE, PAIR_COUNT),
-        constants![FILL = FILL.to_array(), KEY = KEY.to_array(), LUMINANCE = LUMINANCE.to_array(), SHADE_GROUP],
+        constants![
+            ENCODE_STEPS,
+            FILL = FILL.to_array(),
+            KEY = KEY.to_array(),
+            LUMINANCE = LUMINANCE.to_array(),
+            SHADE_GROUP
+        ],
     ],
 };
 

@@ -3,7 +3,7 @@
 use font8x8::UnicodeFonts as _;
 
 use super::color_map::Scale;
-use super::cpu::background;
+use super::encode::background;
 use super::{Background, Image, Shading};
 
 /// Labels along the bar, both ends included.

@@ -24,6 +24,7 @@ mod color_map;
 mod cpu;
 mod depths;
 mod edges;
+mod encode;
 pub(crate) mod gpu;
 mod legend;
 mod light;

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, Step, constants, files, indices, passes};
 use crate::project::Chunk;
 use crate::project::gpu::{Counter, Round};
-use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers};
+use crate::search::engine::{EnginePasses, EngineSteps, SearchBuffers};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {

@@ -4,7 +4,7 @@ use super::cpu;
 use crate::Error;
 use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
 use crate::project::gpu::{Counter, Round, ScreenBuffers, WorkPass};
-use crate::search::gpu::IMPORTS;
+use crate::search::engine::IMPORTS;
 use crate::search::{self, past};
 
 /// Imports and constants of the passes.

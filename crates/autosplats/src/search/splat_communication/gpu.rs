@@ -10,7 +10,7 @@ use crate::gpu::{
 };
 use crate::project::gpu::{Counter, Round};
 use crate::search::MARGIN_PX;
-use crate::search::gpu::{EnginePasses, EngineSteps, IMPORTS, SearchBuffers};
+use crate::search::engine::{EnginePasses, EngineSteps, IMPORTS, SearchBuffers};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
@@ -249,7 +249,7 @@ impl BoundPasses<'_> {
         let Textures { positions, depth, .. } = self.textures;
         let colors = vec![(positions.clone(), Load::Cleared([0.0; 4]))];
         let targets = Targets { colors, depth: depth.clone(), clear_depth: Some(1.0) };
-        targets.step(vec![self.draw(&self.passes.mask, &resources, at!(points))])
+        Step::draw(targets, vec![self.draw(&self.passes.mask, &resources, at!(points))])
     }
 
     fn ask(&self, round: Round) -> Step {
@@ -259,7 +259,7 @@ impl BoundPasses<'_> {
         let Textures { radii, depth, .. } = self.textures;
         let colors = vec![(radii.clone(), Load::Cleared([0.0; 4]))];
         let targets = Targets { colors, depth: depth.clone(), clear_depth: None };
-        targets.step(vec![self.draw(pass, &resources, at!(queries))])
+        Step::draw(targets, vec![self.draw(pass, &resources, at!(queries))])
     }
 
     fn distribute(&self, last: bool) -> Step {
@@ -273,7 +273,7 @@ impl BoundPasses<'_> {
             (&self.passes.distribute, at!(clear), at!(boxes))
         };
         let draws = vec![self.draw(&self.passes.clear_feedback, &[], clear), self.draw(pass, &resources, boxes)];
-        self.textures.into(&[feedback]).step(draws)
+        Step::draw(self.textures.into(&[feedback]), draws)
     }
 
     fn gather(&self, pass: &RasterPass, clear: u64, boxes: u64) -> Step {
@@ -281,7 +281,7 @@ impl BoundPasses<'_> {
         let mut resources = buffers([self.buffers.frame, &self.buffers.screen.points]);
         resources.extend(textures([positions, feedback]));
         let draws = vec![self.draw(&self.passes.clear_radii, &[], clear), self.draw(pass, &resources, boxes)];
-        self.textures.into(&[counts, radii]).step(draws)
+        Step::draw(self.textures.into(&[counts, radii]), draws)
     }
 
     fn count(&self, round: Round) -> Step {

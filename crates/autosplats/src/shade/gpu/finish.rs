@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::super::color_map::Scale;
-use super::super::cpu::{Scene, encode, encode_table};
+use super::super::cpu::Scene;
+use super::super::encode::{encode, encode_table};
 use super::super::{Image, Shading, legend};
 use super::pitch;
 

@@ -4,7 +4,7 @@
 use super::{MAX_SAME_DEPTH_PX, MIN_SEEN_WEIGHT, PAST_SHARE};
 use crate::Error;
 use crate::gpu::{Gpu, Library, Pass, Step, constants, passes};
-use crate::shade::cpu::ENCODE_STEPS;
+use crate::shade::encode::ENCODE_STEPS;
 use crate::shade::gpu::{self, ROW_PIXELS, ShadeBuffers};
 use crate::splat::LayerBuffers;
 

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::{Image, linear_steps};
 use crate::camera::{PlacedView, Reprojection, View};
-use crate::shade::cpu::{encode, encode_table};
+use crate::shade::encode::{encode, encode_table};
 use crate::splat::GBuffer;
 
 /// Share of the last picture in a pixel, 0 to 1.
@@ -88,10 +88,10 @@ impl<M: PartialEq> LastPicture<M> {
 
 impl PictureInProgress<'_> {
     /// Averages a picture with the last one, and keeps it for the next.
-    pub(super) fn average(self, layers: &GBuffer, image: &mut Image) {
+    pub(crate) fn average(&mut self, layers: &GBuffer, image: &mut Image) {
         let Self { last, view, past } = self;
         if let Some(past) = past {
-            last.mix_into(image, layers, &view, &past);
+            last.mix_into(image, layers, view, past);
         }
         last.keep(layers, image);
     }

@@ -1,8 +1,8 @@
 //! Temporal smoothing on the GPU: a pass that looks back, and one that keeps the frame, each with an invocation per
 //! surfel.
 
-use super::points::{Fitted, MIN_SURFACE_COSINE};
-use super::surfaces::MAX_SURFACE_DISTANCE_RADII;
+use super::points::Fitted;
+use super::surfaces::{MAX_SURFACE_DISTANCE_RADII, MIN_SURFACE_COSINE};
 use crate::Error;
 use crate::fit::Surfel;
 use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};

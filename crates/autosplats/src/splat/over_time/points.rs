@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::surfaces::{draw_to, draw_towards, seen_before};
+use super::surfaces::{MIN_SURFACE_COSINE, draw_to, draw_towards, seen_before};
 use crate::camera::{PlacedView, Reprojection, View};
 use crate::fit::{Surfel, Surfels};
 use crate::project::{ScreenPoints, half_at};
@@ -13,8 +13,6 @@ use crate::splat::GBuffer;
 
 /// Frames of the same points that are averaged. See docs/decisions/0014-frame-to-frame.md.
 pub(crate) const STEADY_FRAMES: u32 = 8;
-/// Least cosine of the angle between the surfel's normal and that of the same surface in the last frame.
-pub(super) const MIN_SURFACE_COSINE: f32 = 0.7;
 /// Surfels, or halves of pixels, per task.
 const TASK: usize = 4096;
 

@@ -8,11 +8,12 @@
 
 use glam::Vec3;
 
-use super::points::MIN_SURFACE_COSINE;
 use crate::camera::{Reprojection, View};
 use crate::fit::Surfel;
 use crate::splat::{GBuffer, tiled_index};
 
+/// Least cosine of the angle between the surfel's normal and that of the same surface in the last frame.
+pub(super) const MIN_SURFACE_COSINE: f32 = 0.7;
 /// Largest distance of the same surface in the last frame, in k-radii of the surfel.
 pub(super) const MAX_SURFACE_DISTANCE_RADII: f32 = 0.5;
 
