@@ -1,5 +1,8 @@
 //! Chooses the size of a picture and the share of its points from its time limit.
 
+use autosplats::cloud::PointCloud;
+use rayon::prelude::*;
+
 /// Smallest scale of a picture with a time limit, by its sides.
 const LEAST_SCALE: f64 = 0.25;
 /// Share of the time limit that projecting all points may take before points are left out.
@@ -63,6 +66,29 @@ impl Costs {
         let pace = Reduction { scale, halvings };
         self.last = Some(pace);
         pace
+    }
+}
+
+/// A random subset of the points, for pictures with a time limit.
+pub(super) struct PointSubset {
+    /// Identity of the full cloud.
+    pub(super) identity: u64,
+    pub(super) halvings: u32,
+    pub(super) cloud: PointCloud,
+    /// Index of each point in the full cloud.
+    pub(super) indices: Vec<u32>,
+}
+
+impl PointSubset {
+    /// Picks points by a hash of their index, so that the choice is always the same.
+    pub(super) fn new(cloud: &PointCloud, halvings: u32) -> Self {
+        let kept = |index: usize| {
+            let mixed = (index as u32).wrapping_mul(0x9E37_79B9).rotate_left(15).wrapping_mul(0x85EB_CA6B);
+            mixed >> (32 - halvings) == 0
+        };
+        let all = (0..cloud.len()).into_par_iter();
+        let indices: Vec<u32> = all.filter(|&index| kept(index)).map(|index| index as u32).collect();
+        Self { identity: cloud.identity(), halvings, cloud: cloud.pick(&indices), indices }
     }
 }
 

@@ -11,7 +11,7 @@ use autosplats::{
 };
 use rayon::prelude::*;
 
-use super::pace::{Costs, Reduction};
+use super::pace::{Costs, PointSubset, Reduction};
 use super::task::{Goal, Outcome, PickHit, enlarge};
 use super::{Answer, Depths, Outbox, Picture, RenderRequest, Shared, Task};
 use crate::session::{Document, LayerId, ShownCloud};
@@ -117,29 +117,6 @@ impl Exposure {
             (self.found, self.layers) = (None, layers);
         }
         *self.found.get_or_insert_with(|| usual_exposure(cloud))
-    }
-}
-
-/// A random subset of the points, for pictures with a time limit.
-struct PointSubset {
-    /// Identity of the full cloud.
-    identity: u64,
-    halvings: u32,
-    cloud: PointCloud,
-    /// Index of each point in the full cloud.
-    indices: Vec<u32>,
-}
-
-impl PointSubset {
-    /// Picks points by a hash of their index, so that the choice is always the same.
-    fn new(cloud: &PointCloud, halvings: u32) -> Self {
-        let kept = |index: usize| {
-            let mixed = (index as u32).wrapping_mul(0x9E37_79B9).rotate_left(15).wrapping_mul(0x85EB_CA6B);
-            mixed >> (32 - halvings) == 0
-        };
-        let all = (0..cloud.len()).into_par_iter();
-        let indices: Vec<u32> = all.filter(|&index| kept(index)).map(|index| index as u32).collect();
-        Self { identity: cloud.identity(), halvings, cloud: cloud.pick(&indices), indices }
     }
 }
 
