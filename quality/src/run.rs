@@ -79,8 +79,8 @@ pub fn measure(
     Ok((Outcome { case: *case, measures, still, motion }, Pictures { truth, drawn }))
 }
 
-/// Measures changes while the camera of a case moves around its subject. `smooth`: also those of true pictures of 16 rays
-/// per pixel, which take most of the time.
+/// Measures changes while the camera of a case moves around its subject. `smooth`: also those of true pictures of 16
+/// rays per pixel, which take most of the time.
 ///
 /// # Errors
 /// An invalid camera, or an error of the renderer.

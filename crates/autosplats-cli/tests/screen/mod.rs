@@ -231,8 +231,8 @@ impl Screen {
         Picture { width: width.into(), pixels }
     }
 
-    /// Waits until the screen shows what `is` accepts, two screenshots are equal, and the program hardly computes between
-    /// them: while it does, a finer picture follows. Saves the picture. Panics after `STEP_TIMEOUT`.
+    /// Waits until the screen shows what `is` accepts, two screenshots are equal, and the program hardly computes
+    /// between them: while it does, a finer picture follows. Saves the picture. Panics after `STEP_TIMEOUT`.
     pub(crate) fn settled(&mut self, name: &str, is: impl Fn(&Picture) -> bool) -> Picture {
         self.wait(name, STEP_TIMEOUT, is).unwrap_or_else(|| panic!("step '{name}' is not seen after {STEP_TIMEOUT:?}"))
     }

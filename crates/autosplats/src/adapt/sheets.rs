@@ -26,8 +26,8 @@ mod tests;
 pub(super) const SHEET_LEVELS: [usize; 2] = [1, 2];
 /// Distance from a sheet, in noise levels, up to which a cluster needs no sheet of its own.
 pub(super) const COVERED_NOISES: f32 = 2.0;
-/// Squared distance from a sheet's axis, in squared radii, up to which [`COVERED_NOISES`] applies. At a grazing angle a cell
-/// is a long strip of surface. A larger value makes normals along silhouettes worse.
+/// Squared distance from a sheet's axis, in squared radii, up to which [`COVERED_NOISES`] applies. At a grazing angle a
+/// cell is a long strip of surface. A larger value makes normals along silhouettes worse.
 pub(super) const COVERED_REACH: f32 = 0.12;
 /// Most sheets of a cell.
 pub(super) const SHEETS: usize = 4;

@@ -56,8 +56,8 @@ impl Scene<'_> {
     }
 }
 
-/// Shades `layers` into `image`, also in linear light if `keep_linear`. `average` then mixes the last picture in, before
-/// the legend is drawn. Returns the range of the colour map in world values, if the colour mode has one.
+/// Shades `layers` into `image`, also in linear light if `keep_linear`. `average` then mixes the last picture in,
+/// before the legend is drawn. Returns the range of the colour map in world values, if the colour mode has one.
 pub(crate) fn shade(
     layers: &GBuffer,
     scene: &Scene<'_>,

@@ -234,8 +234,8 @@ fn put(pixel: vec2u, color: vec3f, rgba: u32) {
     }
 }
 
-// A workgroup shades SHADE_GROUP pixels: whole cache lines of the image, and few rows of neighbours. An invocation shades
-// four pixels, two rows apart.
+// A workgroup shades SHADE_GROUP pixels: whole cache lines of the image, and few rows of neighbours. An invocation
+// shades four pixels, two rows apart.
 @compute @workgroup_size(32, 2)
 fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) local: vec3u) {
     let columns = (frame.picture.x + SHADE_GROUP.x - 1u) / SHADE_GROUP.x;

@@ -1,9 +1,9 @@
 //! Handles in the picture: the faces of the clipping box, and the arrows and rings of the selection.
 //!
 //! # How it works
-//! In each frame the handles are projected onto the window ([`WindowLens`]). The nearest handle within reach of the pointer
-//! is the one that a drag would take. A drag changes the document continuously, so that the picture follows, each time
-//! starting from the state before the drag. Undo reverts the whole drag.
+//! In each frame the handles are projected onto the window ([`WindowLens`]). The nearest handle within reach of the
+//! pointer is the one that a drag would take. A drag changes the document continuously, so that the picture follows,
+//! each time starting from the state before the drag. Undo reverts the whole drag.
 
 mod arrows;
 mod faces;

@@ -25,7 +25,8 @@ impl Focus {
         self.panels.push(rect);
     }
 
-    /// Moves the focus to the next part of the window, or with `back` to the previous one. `picture` is the place of the picture.
+    /// Moves the focus to the next part of the window, or with `back` to the previous one. `picture` is the place of
+    /// the picture.
     pub(crate) fn next_part(&mut self, picture: Rect, context: &Context, back: bool) {
         let controls = controls(context);
         let mut windows: Vec<LayerId> = controls.iter().map(|(_, layer, _)| *layer).collect();
