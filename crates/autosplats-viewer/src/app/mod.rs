@@ -8,8 +8,7 @@ use eframe::egui;
 use crate::Options;
 use crate::session::{Session, StoredInput};
 use crate::ui::Ui;
-use crate::view::storage;
-use crate::view::{Look, Outcome, Purpose, State, View};
+use crate::view::{Look, Outcome, Purpose, State, View, storage};
 
 /// The state of the viewer.
 pub(crate) struct App {

@@ -5,8 +5,7 @@ use eframe::egui;
 use super::App;
 use crate::ui::panels::welcome;
 use crate::ui::{Tool, Ui};
-use crate::view::legend;
-use crate::view::overlay;
+use crate::view::{legend, overlay};
 
 impl App {
     /// Shows the picture and handles the mouse.
