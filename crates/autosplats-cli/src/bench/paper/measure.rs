@@ -333,15 +333,13 @@ pub(super) fn accuracy(
     }))
 }
 
-/// Measures kiddo, if the program was built with it.
-#[cfg(feature = "kiddo")]
-pub(super) fn kiddo(loaded: &LoadedScene<'_>, exact: &ExactRadii) -> Outcome<KiddoTimes> {
+/// Measures kiddo.
+pub(super) fn kiddo(loaded: &LoadedScene<'_>, exact: &ExactRadii) -> KiddoTimes {
     let positions = loaded.cloud.positions();
     let visible: Vec<[f32; 3]> = exact.visible.iter().map(|&point| positions[point as usize]).collect();
-    Ok(KiddoTimes { visible_ms: kiddo_ms(&visible), all_ms: kiddo_ms(positions) })
+    KiddoTimes { visible_ms: kiddo_ms(&visible), all_ms: kiddo_ms(positions) }
 }
 
-#[cfg(feature = "kiddo")]
 fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
     use kiddo::{ImmutableKdTree, SquaredEuclidean};
     let start = std::time::Instant::now();
@@ -352,12 +350,6 @@ fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
         std::hint::black_box(found);
     });
     start.elapsed().as_secs_f64() * 1e3
-}
-
-/// Returns how to build with kiddo.
-#[cfg(not(feature = "kiddo"))]
-pub(super) fn kiddo(_: &LoadedScene<'_>, _: &ExactRadii) -> Outcome<KiddoTimes> {
-    Err("this program was built without kiddo; build it with --features kiddo".into())
 }
 
 /// Fraction of the pixels that look different with grid culling.

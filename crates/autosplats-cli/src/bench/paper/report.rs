@@ -117,7 +117,7 @@ impl Report<'_> {
         *page += &"--:|".repeat(Method::ALL.len() + 2);
         *page += "\n";
         for scene in self.scenes {
-            let kiddo: Option<Outcome<KiddoTimes>> = self.journal.get(&Task::Kiddo.key(scene, self.renderers));
+            let kiddo: Option<KiddoTimes> = self.journal.get(&Task::Kiddo.key(scene, self.renderers));
             for culled in [false, true] {
                 let Some(Ok(timing)) = self.timing(scene, Task::Table(Method::GridCpu, culled)) else {
                     continue;
@@ -138,7 +138,7 @@ impl Report<'_> {
                     _ = write!(page, " {} |", self.search(scene, method, culled));
                 }
                 match &kiddo {
-                    Some(Ok(KiddoTimes { visible_ms, all_ms })) if !culled => {
+                    Some(KiddoTimes { visible_ms, all_ms }) if !culled => {
                         _ = writeln!(page, " {visible_ms:.0} | {all_ms:.0} |");
                     }
                     _ => *page += " | |\n",
