@@ -5,10 +5,10 @@
 /// # Examples
 ///
 /// ```
-/// use autosplats_cloud::{ErrorKind, check_memory};
+/// use autosplats_cloud::{Error, ErrorKind};
 ///
-/// let Err(error) = check_memory("all points", u64::MAX) else { panic!("nobody has that much") };
-/// assert_eq!(error.kind(), ErrorKind::Memory);
+/// let error = Error::malformed("scan.ply".as_ref(), "line 3", "'abc' is not a number");
+/// assert_eq!(error.kind(), ErrorKind::Data);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]

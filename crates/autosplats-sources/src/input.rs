@@ -1,6 +1,6 @@
 //! An input: a source, and all that a user states about it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use autosplats_cloud::Error;
 use autosplats_formats::ReadOptions;
@@ -60,6 +60,18 @@ impl Input {
         let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
         let source = Source::parse(&path.display().to_string()).unwrap_or(Source::File(path));
         Self::new(name, source)
+    }
+
+    /// Name of the source, as a user could type it.
+    #[must_use]
+    pub fn source_name(&self) -> String {
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string();
+        match &self.source {
+            Source::File(path) | Source::Recording(path) => absolute(path),
+            Source::Sequence(name) => absolute(Path::new(name)),
+            Source::Remote(address) => address.clone(),
+            Source::Scene(..) | Source::StandardInput => self.name.clone(),
+        }
     }
 
     /// Whether the points change over time: by themselves, or because the options ask to play a scene or a glTF file.
