@@ -86,8 +86,8 @@ const GPU_ENGINES: [&str; 2] = ["-k 10 --engine splat-communication", "-k 10 --e
 const MOVING: [(&str, &str); 7] = [
     ("scene:herd:60K", "--frames 0..3 --frames-averaged 4"),
     ("scene:figure:60K", "--frames 0..2 --scan 3 --color k-radius"),
-    ("animation/samba", "--frames 0..2 --strew 50K"),
-    ("animation/stork_morph.glb", "--frames 0..2 --strew 50K"),
+    ("animation/samba", "--frames 0..2 --sample 50K"),
+    ("animation/stork_morph.glb", "--frames 0..2 --sample 50K"),
     ("sequences/kitti_drive_pcd", "--frames 0..2 --frames-averaged 3"),
     ("sequences/ouster_ros2_cdr.mcap", "--frames 0..1 --decay 1s"),
     ("sequences/rgbd_kinect", "--frames 0..1"),

@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn tests_and_the_command_are_told_apart() {
         let lines = [
-            message("autosplats-film", "autosplats_film", "lib", true),
+            message("autosplats-output", "autosplats_output", "lib", true),
             message("autosplats-cli", "autosplats", "bin", false),
             message("autosplats-cli", "autosplats", "bin", true),
             message("autosplats-quality", "it", "test", true),
@@ -182,7 +182,11 @@ mod tests {
         ];
         let programs = Programs::from_messages(&lines.join("\n")).expect("messages");
         let names: Vec<&str> = programs.tests.iter().map(|program| program.name.as_str()).collect();
-        assert_eq!(names, ["autosplats-quality it", "autosplats-film lib", "autosplats-cli bin"], "the longest first");
+        assert_eq!(
+            names,
+            ["autosplats-quality it", "autosplats-output lib", "autosplats-cli bin"],
+            "the longest first"
+        );
         assert_eq!(programs.command().expect("the command"), Path::new("/t/autosplats-bin"), "not its tests");
         assert!(Programs::from_messages("").is_err(), "no test at all is an error");
     }

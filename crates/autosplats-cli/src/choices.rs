@@ -3,7 +3,7 @@
 use autosplats::Backs;
 use clap::ValueEnum;
 
-use crate::first_radius::FirstRadius;
+use crate::values::FirstRadius;
 
 /// Side that normals point to.
 #[derive(Clone, Copy, Debug, ValueEnum)]

@@ -1,7 +1,6 @@
 //! `autosplats doctor`: reports what this machine can do and tests the program on it.
 
 use std::fs::read_to_string;
-use std::io::{IsTerminal as _, stderr, stdout};
 use std::time::Instant;
 
 use autosplats::{AdapterSummary, Backend as BackendChoice, Frame, Renderer, Settings, adapters};
@@ -12,10 +11,10 @@ use pulp::{Arch, Simd, WithSimd};
 use serde::Serialize;
 
 use crate::args::DoctorArgs;
+use crate::console::Console;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
 use crate::info::wrapped;
-use crate::output::{print_bytes, print_line};
 use crate::render::scene_camera;
 
 /// Least memory of a point in bytes: position and colour.
@@ -106,14 +105,12 @@ struct Format {
 }
 
 /// Examines the machine, tests the program on a small scene and prints the findings.
-pub(crate) fn run(args: &DoctorArgs) -> Result<(), Failure> {
-    let findings = Findings::new();
+pub(crate) fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
+    let findings = Findings::new(console);
     if args.json {
-        let json =
-            serde_json::to_string(&findings).map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))?;
-        print_line(&json)?;
+        console.print_json(&findings)?;
     } else {
-        print_bytes(findings.to_text().as_bytes())?;
+        console.print(findings.to_text())?;
     }
     if findings.backends.iter().all(|backend| !backend.ready) {
         return Err(Failure::new(Exit::Device, "no backend works; the self-test shows why"));
@@ -125,7 +122,7 @@ pub(crate) fn run(args: &DoctorArgs) -> Result<(), Failure> {
 }
 
 impl Findings {
-    fn new() -> Self {
+    fn new(console: &Console) -> Self {
         let self_test = SelfTest::run();
         let Device { name, threads, simd, .. } = Device::cpu();
         let (simd_used, lanes) = simd_used();
@@ -150,8 +147,8 @@ impl Findings {
             },
             self_test,
             terminal: Terminal {
-                standard_output: stdout().is_terminal(),
-                standard_error: stderr().is_terminal(),
+                standard_output: console.data_to_terminal(),
+                standard_error: console.messages_to_terminal(),
                 kind: std::env::var("TERM").ok(),
             },
             formats: Formats {

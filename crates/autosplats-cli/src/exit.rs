@@ -2,9 +2,12 @@
 
 use std::fmt::Display;
 
+use autosplats_cloud::ErrorKind;
+use autosplats_scenes::Scene;
+
 /// Kind of failure; its value is the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Exit {
+pub enum Exit {
     /// The command line names something that does not exist or does not fit together.
     Usage = 2,
     /// An input is missing, unreadable or malformed, or shows nothing.
@@ -41,7 +44,18 @@ pub(crate) struct Failure {
 impl Failure {
     /// A failure of this kind with a message.
     pub(crate) fn new(exit: Exit, message: impl Display) -> Self {
-        Self { exit, message: plain(message.to_string()) }
+        Self { exit, message: one_line(&message.to_string()) }
+    }
+
+    /// The failure with the exit code of an error's kind.
+    fn of(kind: ErrorKind, error: impl Display) -> Self {
+        match kind {
+            ErrorKind::Argument => Self::usage(error),
+            ErrorKind::Memory => Self::new(Exit::Memory, error),
+            ErrorKind::Device => Self::new(Exit::Device, error),
+            ErrorKind::Cancelled => Self::interrupted(),
+            _ => Self::new(Exit::Input, error),
+        }
     }
 
     pub(crate) fn usage(message: impl Display) -> Self {
@@ -53,8 +67,65 @@ impl Failure {
     }
 }
 
-/// A message of the operating system without its error number.
-fn plain(message: String) -> String {
+impl From<autosplats_cloud::Error> for Failure {
+    fn from(error: autosplats_cloud::Error) -> Self {
+        match error {
+            autosplats_cloud::Error::UnknownScene { given, .. } => {
+                let known = Scene::names().map(|(name, _)| name);
+                Self::usage(format!("no scene is called '{given}'; {}", suggest(&given, known)))
+            }
+            error => Self::of(error.kind(), error),
+        }
+    }
+}
+
+impl From<autosplats::Error> for Failure {
+    fn from(error: autosplats::Error) -> Self {
+        match error {
+            autosplats::Error::Setting { name, value, range } => {
+                let option = OPTIONS.iter().find_map(|(field, option)| (*field == name).then_some(*option));
+                let or = if name == "k" { ", or 'auto'" } else { "" };
+                Self::usage(format!("{} {value}: it must be {range}{or}", option.unwrap_or(name)))
+            }
+            error => Self::of(error.kind(), error),
+        }
+    }
+}
+
+impl From<autosplats_output::Error> for Failure {
+    fn from(error: autosplats_output::Error) -> Self {
+        match error.kind() {
+            ErrorKind::Argument => Self::usage(error),
+            _ => Self::new(Exit::Output, error),
+        }
+    }
+}
+
+#[cfg(feature = "viewer")]
+impl From<autosplats_viewer::Error> for Failure {
+    fn from(error: autosplats_viewer::Error) -> Self {
+        Self::of(error.kind(), error)
+    }
+}
+
+/// Fields of the libraries' settings and the options that set them.
+const OPTIONS: [(&str, &str); 11] = [
+    ("k", "-k"),
+    ("points_per_pixel", "--points-per-pixel"),
+    ("first_radius", "--first-radius"),
+    ("outlier_expansions", "--e0"),
+    ("gap_factor", "--gap-factor"),
+    ("splat_scale", "--splat-scale"),
+    ("frames_averaged", "--frames-averaged"),
+    ("exposure", "--exposure"),
+    ("occlusion", "--occlusion"),
+    ("range", "--range"),
+    ("orientation", "--sensor"),
+];
+
+/// A message in one line, without the error numbers of the operating system.
+fn one_line(message: &str) -> String {
+    let message = message.lines().map(str::trim).collect::<Vec<_>>().join(" ");
     let number = message.split_once(" (os error ").and_then(|(said, after)| Some((said, after.split_once(')')?)));
     match number {
         Some((said, (digits, rest))) if digits.parse::<i32>().is_ok() => format!("{said}{rest}"),
@@ -74,13 +145,23 @@ pub(crate) fn suggest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>)
 
 #[cfg(test)]
 mod tests {
-    use super::{plain, suggest};
+    use autosplats::Settings;
+
+    use super::{Failure, one_line, suggest};
 
     #[test]
     fn the_system_is_told_without_its_numbers() {
-        let said = |text: &str| plain(text.into());
-        assert_eq!(said("a.ply: No such file (os error 2); type b"), "a.ply: No such file; type b");
-        assert_eq!(said("a (os error b).ply: empty"), "a (os error b).ply: empty", "a name");
+        assert_eq!(one_line("a.ply: No such file (os error 2); type b"), "a.ply: No such file; type b");
+        assert_eq!(one_line("a (os error b).ply: empty"), "a (os error b).ply: empty", "a name");
+        assert_eq!(one_line("a:\n  b"), "a: b", "one line");
+    }
+
+    #[test]
+    fn settings_are_called_as_their_options() {
+        let mut settings = Settings::default();
+        settings.reconstruction.outlier_expansions = Some(9);
+        let message = settings.check().map_err(|error| Failure::from(error).message);
+        assert_eq!(message, Err("--e0 9: it must be within 0 to 8".into()));
     }
 
     #[test]

@@ -11,12 +11,13 @@ use autosplats_cloud::glam::{DMat4, DVec3};
 use autosplats_cloud::{Error, PointCloud, Progress, check_memory, sample_surface};
 use autosplats_formats::{ReadOptions, read_mesh};
 use autosplats_scenes::{SCENE_PREFIX, Scene};
-use autosplats_sources::{LatestOptions, Live, PlayOptions, Player, Source, beginnings};
+use autosplats_sources::{Input, LatestOptions, Live, PlayOptions, Player, Source, beginnings};
 use rayon::prelude::*;
 
 use self::pose::read_pose;
 use crate::args::{InputArgs, PlayingArgs, ReadingArgs};
-use crate::exit::{Exit, Failure, suggest};
+use crate::console::Console;
+use crate::exit::{Exit, Failure};
 use crate::output::{ReadFiles, folder_of};
 use crate::progress::{Bar, InputProgress};
 
@@ -29,19 +30,19 @@ const MAX_GAP_SIZES: f64 = 200.0;
 #[derive(Debug)]
 pub(crate) struct Inputs {
     list: Vec<Input>,
-    options: ReadOptions,
-    play: PlayOptions,
+    /// Files of the poses.
+    poses: Vec<PathBuf>,
 }
 
 impl PlayingArgs {
     /// The options for the library.
     pub(crate) fn options(&self) -> PlayOptions {
-        let Self { fps, topics, fixed_frame, decay, accumulate, strew, scan } = self;
+        let Self { fps, topics, fixed_frame, decay, accumulate, sample, scan } = self;
         PlayOptions {
             fps: *fps,
             topics: topics.clone(),
             frame: fixed_frame.clone(),
-            sample: *strew,
+            sample: *sample,
             scanners: scan.map(usize::from),
             latest: LatestOptions { decay: *decay, accumulate: *accumulate, ..LatestOptions::default() },
             ..PlayOptions::default()
@@ -62,16 +63,6 @@ impl ReadingArgs {
     }
 }
 
-/// One input and its pose in the world.
-#[derive(Debug)]
-struct Input {
-    name: String,
-    source: Source,
-    world_from_input: DMat4,
-    /// File of the pose.
-    pose: Option<PathBuf>,
-}
-
 pub(crate) struct Playing {
     pub(crate) name: String,
     pub(crate) player: Player,
@@ -86,26 +77,30 @@ impl Inputs {
     /// Parses the command line's names without reading a point. Checks scene names, file existence and poses.
     pub(crate) fn new(names: &[String], args: &InputArgs) -> Result<Self, Failure> {
         let InputArgs { poses, reading, playing } = args;
-        let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
+        let mut list = names.iter().map(|name| existing(name)).collect::<Result<Vec<_>, _>>()?;
         if list.iter().filter(|input| matches!(input.source, Source::StandardInput)).count() > 1 {
             return Err(Failure::usage("-: standard input can be read only once; name it once"));
         }
         let generated = list.iter().map(|input| input.source.least_bytes()).sum();
-        check_memory("the points of generated scenes", generated).map_err(read_failure)?;
+        check_memory("the points of generated scenes", generated)?;
         if reading.columns.is_some() && list.iter().all(|input| matches!(input.source, Source::Scene(..))) {
             return Err(Failure::usage("--columns: no input is a file; generated scenes have no columns"));
         }
+        let mut files = Vec::new();
         for pose in poses {
             let (place, file) = posed(names, pose).ok_or_else(|| {
                 let names = names.join(", ");
                 Failure::usage(format!("--pose {pose}: must be INPUT=FILE, where INPUT is one of: {names}"))
             })?;
             list[place].world_from_input = read_pose(file)?;
-            list[place].pose = Some(file.into());
+            files.push(file.into());
         }
-        // A pipe's frames are read one by one, since its writer can wait and no frame comes twice.
-        let play = PlayOptions { all: true, ..playing.options() };
-        Ok(Self { list, options: reading.options(), play })
+        for input in &mut list {
+            // A pipe's frames are read one by one, since its writer can wait and no frame comes twice.
+            input.play = PlayOptions { all: true, ..playing.options() };
+            input.options = reading.options();
+        }
+        Ok(Self { list, poses: files })
     }
 
     /// Parses the inputs and, as the last name, the output.
@@ -118,38 +113,26 @@ impl Inputs {
 
     /// A built-in scene alone.
     pub(crate) fn scene(name: &str) -> Result<Self, Failure> {
-        let input = Input::new(&format!("{SCENE_PREFIX}{name}"))?;
-        Ok(Self { list: vec![input], options: ReadOptions::default(), play: PlayOptions::default() })
+        Ok(Self { list: vec![Input::parse(&format!("{SCENE_PREFIX}{name}"))?], poses: Vec::new() })
     }
 
     /// Reads all digits, for writing the points again.
     fn exactly(mut self) -> Self {
-        self.options.exact = true;
+        self.list.iter_mut().for_each(|input| input.options.exact = true);
         self
     }
 
     /// The inputs for the viewer.
     #[cfg(feature = "viewer")]
-    pub(crate) fn for_viewer(mut self, watch: bool) -> Vec<autosplats_viewer::Input> {
-        // The window shows the current state and skips older frames.
-        (self.play.watch, self.play.all) = (watch, false);
-        let Self { list, options, play } = self;
-        // Sampling and scanning need a player, and so does a frame rate for scenes and glTF files.
-        let made = play.scanners.is_some() || play.sample.is_some();
-        let looked_at = |source: &Source| match source {
-            Source::Scene(..) => true,
-            Source::File(path) => {
-                path.extension().is_some_and(|end| end.eq_ignore_ascii_case("glb") || end.eq_ignore_ascii_case("gltf"))
+    pub(crate) fn for_viewer(mut self, watch: bool) -> Vec<Input> {
+        for Input { name, source, play, .. } in &mut self.list {
+            // The window shows the current state and skips older frames.
+            (play.watch, play.all) = (watch, false);
+            if let Some(short) = source.short_name() {
+                *name = short;
             }
-            _ => false,
-        };
-        let input = |Input { name, source, world_from_input, .. }| {
-            let played = made || play.fps.is_some() && looked_at(&source);
-            let (options, play) = (options.clone(), play.clone());
-            let name = source.short_name().unwrap_or(name);
-            autosplats_viewer::Input { name, source, options, play, played, world_from_input }
-        };
-        list.into_iter().map(input).collect()
+        }
+        self.list
     }
 
     pub(crate) fn only(&self) -> &Source {
@@ -158,8 +141,8 @@ impl Inputs {
 
     /// Files that are read, including those of sequences and poses, and `others`.
     pub(crate) fn files<'a>(&'a self, others: impl IntoIterator<Item = &'a Path>) -> ReadFiles {
-        let own = self.list.iter().flat_map(|input| input.source.files().into_iter().chain(input.pose.clone()));
-        ReadFiles::new(own.chain(others.into_iter().map(Path::to_owned)))
+        let own = self.list.iter().flat_map(|input| input.source.files());
+        ReadFiles::new(own.chain(self.poses.clone()).chain(others.into_iter().map(Path::to_owned)))
     }
 
     /// The names as typed, for messages.
@@ -182,32 +165,24 @@ impl Inputs {
     }
 
     /// Reads all inputs into one cloud.
-    pub(crate) fn read(&self, quiet: bool) -> Result<PointCloud, Failure> {
-        let made = self.play.scanners.is_some() || self.play.sample.is_some();
-        self.read_each(quiet, |input, progress| {
-            if !made && !input.source.moves() {
-                return input.source.read(&self.options, progress);
+    pub(crate) fn read(&self, console: &Console) -> Result<PointCloud, Failure> {
+        self.read_each(console, |input, progress| {
+            if input.source.moves() || is_made(input) {
+                first_frame(input, progress)
+            } else {
+                input.source.read(&input.options, progress)
             }
-            let mut player = input.source.play(&self.play, &self.options, progress)?;
-            let frames = player.stream().timeline().map_or(0, |timeline| timeline.stamps().len());
-            if frames > 1 {
-                progress.note(&format!("this is the first of {frames} frames"));
-            }
-            player.first(Source::FIRST_POINTS_TIMEOUT, progress).map(Arc::unwrap_or_clone)
         })
     }
 
     /// Prepares the inputs for playing, with their poses. If `watched`, files and folders are followed as they change.
-    pub(crate) fn play(&self, watched: bool, quiet: bool) -> Result<Vec<Playing>, Failure> {
+    pub(crate) fn play(&self, watched: bool, console: &Console) -> Result<Vec<Playing>, Failure> {
         let open = |input: &Input| {
-            let bar = Bar::on_file("opening", Path::new(&input.name), quiet);
+            let bar = Bar::on_file("opening", Path::new(&input.name), console);
             let player = match &input.source {
-                Source::File(path) if watched => self.watch(path, &input.name),
-                Source::Sequence(folder) if watched => self.watch(Path::new(folder), &input.name),
-                source => source.play(&self.play, &self.options, &bar).map_err(|error| match error {
-                    Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
-                    error => read_failure(error),
-                }),
+                Source::File(path) if watched => watch(path, input),
+                Source::Sequence(folder) if watched => watch(Path::new(folder), input),
+                source => source.play(&input.play, &input.options, &bar).map_err(|error| failure(input, error)),
             }?;
             let Input { name, source, world_from_input, .. } = input;
             let (name, moves, world_from_input) = (name.clone(), source.moves(), *world_from_input);
@@ -260,44 +235,32 @@ impl Inputs {
         Ok(())
     }
 
-    /// Plays a file or a folder as it changes.
-    fn watch(&self, path: &Path, name: &str) -> Result<Player, Failure> {
-        if self.play.sample.is_some() || self.play.scanners.is_some() {
-            return Err(Failure::usage(format!("--watch: {name} cannot be sampled; leave out --strew and --scan")));
-        }
-        let stream = Live::watch(path, &self.options).map_err(read_failure)?;
-        Ok(Player::new(Box::new(stream), self.play.latest.clone()))
-    }
-
     /// Reads meshes and samples `count` points on the surface of each, into one cloud.
-    pub(crate) fn sample(&self, count: usize, seed: u64, quiet: bool) -> Result<PointCloud, Failure> {
+    pub(crate) fn sample(&self, count: usize, seed: u64, console: &Console) -> Result<PointCloud, Failure> {
         if let Some(input) = self.list.iter().find(|input| matches!(input.source, Source::Scene(..))) {
             let name = &input.name;
             return Err(Failure::usage(format!("--sample: {name} is not a mesh; set its point count as {name}:1M")));
         }
-        self.read_each(quiet, |input, progress| match &input.source {
-            Source::File(path) => sample_surface(&read_mesh(path, &self.options, progress)?, count, seed, &()),
-            scene => scene.read(&self.options, progress),
+        self.read_each(console, |input, progress| match &input.source {
+            Source::File(path) => sample_surface(&read_mesh(path, &input.options, progress)?, count, seed, &()),
+            _ => first_frame(input, progress),
         })
     }
 
     /// Reads the inputs in parallel, each by `read`, and merges them.
     fn read_each(
         &self,
-        quiet: bool,
+        console: &Console,
         read: impl Fn(&Input, &dyn Progress) -> Result<PointCloud, Error> + Sync,
     ) -> Result<PointCloud, Failure> {
         let title = match self.list.as_slice() {
-            [input] => input.task(),
+            [input] => task(input),
             several => format!("reading {} inputs", several.len()),
         };
-        let bar = Bar::new(&title, quiet);
+        let bar = Bar::new(&title, console);
         let parts: Vec<_> = self.list.iter().map(|input| bar.part(self.list.len(), &input.name)).collect();
         let clouds = self.list.par_iter().zip(&parts).map(|(input, part)| {
-            let cloud = read(input, part).map_err(|error| match error {
-                Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
-                error => read_failure(error),
-            })?;
+            let cloud = read(input, part).map_err(|error| failure(input, error))?;
             if cloud.is_empty() {
                 return Err(Failure::new(Exit::Input, format!("{}: there are no points in it", input.name)));
             }
@@ -390,53 +353,67 @@ fn world_box((cloud, world_from_input): &(PointCloud, DMat4)) -> [DVec3; 2] {
     each.filter(|place| place.is_finite()).fold(none, |[low, high], place| [low.min(place), high.max(place)])
 }
 
-impl Input {
-    fn new(name: &str) -> Result<Self, Failure> {
-        let source = Source::parse(name).map_err(unknown_scene)?;
-        if let Some(path) = source.path() {
-            let metadata = metadata(path).map_err(|error| {
-                let hint = if Scene::names().any(|(scene, _)| scene == name) {
-                    format!("; for the generated scene type scene:{name}")
-                } else {
-                    String::new()
-                };
-                Failure::new(Exit::Input, format!("{name}: {error}{hint}"))
-            })?;
-            if metadata.is_dir() && matches!(source, Source::File(_)) {
-                return Err(Failure::new(Exit::Input, format!("{name}: this is a folder; name the files in it")));
-            }
-        }
-        Ok(Self { name: name.into(), source, world_from_input: DMat4::IDENTITY, pose: None })
-    }
-
-    /// Title of the reading task.
-    fn task(&self) -> String {
-        match &self.source {
-            Source::File(path) => {
-                format!("reading {}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
-            }
-            Source::Scene(..) => format!("generating {}", self.name),
-            Source::Sequence(_) | Source::Recording(_) | Source::StandardInput => format!("reading {}", self.name),
-            Source::Remote(_) => format!("waiting for {}", self.name),
+/// Parses the name of an input. A file must exist.
+fn existing(name: &str) -> Result<Input, Failure> {
+    let input = Input { name: name.into(), ..Input::parse(name)? };
+    if let Some(path) = input.source.path() {
+        let metadata = metadata(path).map_err(|error| {
+            let hint = if Scene::names().any(|(scene, _)| scene == name) {
+                format!("; for the generated scene type {SCENE_PREFIX}{name}")
+            } else {
+                String::new()
+            };
+            Failure::new(Exit::Input, format!("{name}: {error}{hint}"))
+        })?;
+        if metadata.is_dir() && matches!(input.source, Source::File(_)) {
+            return Err(Failure::new(Exit::Input, format!("{name}: this is a folder; name the files in it")));
         }
     }
+    Ok(input)
 }
 
-fn unknown_scene(error: Error) -> Failure {
-    Failure::usage(match error {
-        Error::UnknownScene { given, .. } => {
-            format!("no scene is called '{given}'; {}", suggest(&given, Scene::names().map(|(name, _)| name)))
-        }
-        other => other.to_string(),
-    })
+/// Whether the points are sampled or scanned, so that there are none without a surface.
+fn is_made(input: &Input) -> bool {
+    input.play.sample.is_some() || input.play.scanners.is_some()
 }
 
-/// The failure with the exit code of a read error.
-pub(crate) fn read_failure(error: Error) -> Failure {
+/// The first points of an input that is played.
+fn first_frame(input: &Input, progress: &dyn Progress) -> Result<PointCloud, Error> {
+    let mut player = input.source.play(&input.play, &input.options, progress)?;
+    let frames = player.stream().timeline().map_or(0, |timeline| timeline.stamps().len());
+    if frames > 1 {
+        progress.note(&format!("this is the first of {frames} frames"));
+    }
+    player.first(Source::FIRST_POINTS_TIMEOUT, progress).map(Arc::unwrap_or_clone)
+}
+
+/// Plays a file or a folder as it changes.
+fn watch(path: &Path, input: &Input) -> Result<Player, Failure> {
+    if is_made(input) {
+        let name = &input.name;
+        return Err(Failure::usage(format!("--watch: {name} cannot be sampled; leave out --sample and --scan")));
+    }
+    let stream = Live::watch(path, &input.options)?;
+    Ok(Player::new(Box::new(stream), input.play.latest.clone()))
+}
+
+/// The failure to read an input. The message names the input.
+fn failure(input: &Input, error: Error) -> Failure {
     match error {
-        Error::Cancelled => Failure::interrupted(),
-        Error::OutOfMemory { .. } => Failure::new(Exit::Memory, error),
-        _ => Failure::new(Exit::Input, error),
+        Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
+        error => error.into(),
+    }
+}
+
+/// Title of the task that reads an input.
+fn task(input: &Input) -> String {
+    match &input.source {
+        Source::File(path) => {
+            format!("reading {}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
+        }
+        Source::Scene(..) => format!("generating {}", input.name),
+        Source::Sequence(_) | Source::Recording(_) | Source::StandardInput => format!("reading {}", input.name),
+        Source::Remote(_) => format!("waiting for {}", input.name),
     }
 }
 

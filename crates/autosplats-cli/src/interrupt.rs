@@ -1,48 +1,50 @@
-//! Ctrl-C ends the program at once. If a file is being written, the end waits until its temporary file is removed. Work
-//! without an end of its own [finishes](end_gently) at the first Ctrl-C.
+//! Requests to end a command early, such as Ctrl-C.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::exit::Exit;
+/// A request to end a command. Clones are the same request.
+///
+/// A command stops at the next chance and removes its temporary files. Work without an end of its own, such as pictures
+/// of live input, finishes what it has at the first request, and stops at the second.
+#[derive(Clone, Debug, Default)]
+pub struct Interrupt(Arc<State>);
 
-static END_NOW: AtomicBool = AtomicBool::new(false);
-static FINISH_FIRST: AtomicBool = AtomicBool::new(false);
-static FINISHING: AtomicBool = AtomicBool::new(false);
-static WRITE_LOCK: Mutex<()> = Mutex::new(());
+#[derive(Debug, Default)]
+struct State {
+    end_now: AtomicBool,
+    finish_first: AtomicBool,
+    finishing: AtomicBool,
+    write_lock: Mutex<()>,
+}
 
-/// Installs the handler. Where none can be installed, as in some containers, the system's default ends the program.
-pub(crate) fn install() {
-    let _ = ctrlc::set_handler(|| {
-        if FINISH_FIRST.load(Ordering::SeqCst) && !FINISHING.swap(true, Ordering::SeqCst) {
-            return;
+impl Interrupt {
+    /// Asks the command to end. Returns false if the work finishes what it has, and true if it stops.
+    pub fn request(&self) -> bool {
+        if self.0.finish_first.load(Ordering::SeqCst) && !self.0.finishing.swap(true, Ordering::SeqCst) {
+            return false;
         }
-        END_NOW.store(true, Ordering::SeqCst);
-        // The writing thread sees the request, removes its temporary file and releases the lock; nothing is left
-        // behind.
-        let _nothing_is_being_written = writing();
-        // The line feed leaves the cursor's line, where the terminal shows ^C and perhaps a progress bar.
-        eprintln!("\nerror: interrupted");
-        std::process::exit(Exit::Interrupted as i32);
-    });
-}
+        self.0.end_now.store(true, Ordering::SeqCst);
+        true
+    }
 
-/// Makes the next Ctrl-C only ask the work to [finish](ending). The one after ends the program.
-pub(crate) fn end_gently() {
-    FINISH_FIRST.store(true, Ordering::SeqCst);
-}
+    /// Lock that is held while a temporary file exists. A process that holds it can end and leaves no such file.
+    pub fn writing(&self) -> MutexGuard<'_, ()> {
+        self.0.write_lock.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 
-/// Whether the work has been asked to finish.
-pub(crate) fn ending() -> bool {
-    FINISHING.load(Ordering::SeqCst)
-}
+    /// Makes the next request only ask the work to [finish](Self::ending).
+    pub(crate) fn end_gently(&self) {
+        self.0.finish_first.store(true, Ordering::SeqCst);
+    }
 
-/// Whether the program has been asked to end at once.
-pub(crate) fn requested() -> bool {
-    END_NOW.load(Ordering::SeqCst)
-}
+    /// Whether the work has been asked to finish.
+    pub(crate) fn ending(&self) -> bool {
+        self.0.finishing.load(Ordering::SeqCst)
+    }
 
-/// Lock that is held while a temporary file exists.
-pub(crate) fn writing() -> MutexGuard<'static, ()> {
-    WRITE_LOCK.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Whether the command has been asked to end at once.
+    pub(crate) fn requested(&self) -> bool {
+        self.0.end_now.load(Ordering::SeqCst)
+    }
 }

@@ -1,32 +1,30 @@
 //! `autosplats completions` and `autosplats man`: shell scripts and manual pages, generated from the command line's
 //! definition.
 
-use std::fs::create_dir_all;
 use std::io::Write as _;
 
 use clap::{Command, CommandFactory as _};
 use clap_mangen::Man;
 
 use crate::args::{CommandLine, CompletionsArgs, ManArgs};
+use crate::console::Console;
 use crate::exit::{Exit, Failure};
-use crate::output::{ReadFiles, check_target, print_bytes, print_line, write_file};
+use crate::output::{ReadFiles, check_target, create_folder, write_file};
 
 /// Prints the completion script of a shell.
-pub(crate) fn completions(args: &CompletionsArgs) -> Result<(), Failure> {
+pub(crate) fn completions(args: &CompletionsArgs, console: &Console) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut CommandLine::command(), "autosplats", &mut script);
-    print_bytes(&script)
+    console.print(script)
 }
 
 /// Prints the main page, or writes all pages into a folder.
-pub(crate) fn manual(args: &ManArgs) -> Result<(), Failure> {
+pub(crate) fn manual(args: &ManArgs, console: &Console) -> Result<(), Failure> {
     let pages = pages();
     let Some(folder) = &args.out else {
-        return print_bytes(&render(&pages[0].1)?);
+        return console.print(render(&pages[0].1)?);
     };
-    create_dir_all(folder).map_err(|error| {
-        Failure::new(Exit::Output, format!("{}: cannot create the folder: {error}", folder.display()))
-    })?;
+    create_folder(folder)?;
     let paths: Vec<_> = pages.iter().map(|(name, _)| folder.join(format!("{name}.1"))).collect();
     // Every target is checked before the first is written, so that a refusal leaves no partial set.
     for path in &paths {
@@ -36,12 +34,12 @@ pub(crate) fn manual(args: &ManArgs) -> Result<(), Failure> {
                 format!("{}: already exists; --force replaces pages", path.display()),
             ));
         }
-        check_target(path, &ReadFiles::default())?;
+        check_target(path, &ReadFiles::default(), console)?;
     }
     for (path, (_, page)) in paths.iter().zip(&pages) {
         let page = render(page)?;
-        write_file(path, |writer| writer.write_all(&page))?;
-        print_line(&path.display().to_string())?;
+        write_file(path, console, |writer| writer.write_all(&page))?;
+        console.print_line(path.display())?;
     }
     Ok(())
 }

@@ -1,6 +1,5 @@
 //! Progress on standard error: only on a terminal, and only for tasks of more than half a second.
 
-use std::io::{IsTerminal as _, stderr};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -11,7 +10,7 @@ use std::time::Duration;
 use autosplats_cloud::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::interrupt;
+use crate::console::Console;
 
 const SHOW_AFTER: Duration = Duration::from_millis(500);
 const REDRAW_INTERVAL: Duration = Duration::from_millis(100);
@@ -25,8 +24,7 @@ pub(crate) struct Bar {
     bar: ProgressBar,
     /// Input that [notes](Progress::note) are about.
     subject: String,
-    /// Whether notes are suppressed.
-    quiet: bool,
+    console: Console,
     /// Sender that ends the drawing thread when dropped.
     done: Option<Sender<()>>,
     drawing: Option<JoinHandle<()>>,
@@ -34,29 +32,27 @@ pub(crate) struct Bar {
 
 impl Bar {
     /// Starts a task that [reports](Progress::report) its progress.
-    pub(crate) fn new(task: &str, quiet: bool) -> Self {
-        Self::start(task, quiet, "{msg:30!} [{bar:40}] {percent:>3} % {eta:>4}", "=> ")
+    pub(crate) fn new(task: &str, console: &Console) -> Self {
+        Self::start(task, console, "{msg:30!} [{bar:40}] {percent:>3} % {eta:>4}", "=> ")
     }
 
     /// Starts a task on a file, which its notes then name.
-    pub(crate) fn on_file(task: &str, file: &Path, quiet: bool) -> Self {
+    pub(crate) fn on_file(task: &str, file: &Path, console: &Console) -> Self {
         let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
-        let mut bar = Self::new(&format!("{task} {name}"), quiet);
+        let mut bar = Self::new(&format!("{task} {name}"), console);
         bar.subject = file.display().to_string();
         bar
     }
 
     /// Starts a task whose notes name `input`.
-    pub(crate) fn on_input(task: &str, input: &str, quiet: bool) -> Self {
-        let mut bar = Self::new(task, quiet);
+    pub(crate) fn on_input(task: &str, input: &str, console: &Console) -> Self {
+        let mut bar = Self::new(task, console);
         bar.subject = input.into();
         bar
     }
 
     fn tell(&self, subject: &str, note: &str) {
-        if !self.quiet {
-            self.bar.suspend(|| eprintln!("note: {subject}: {note}"));
-        }
+        self.bar.suspend(|| self.console.note(format_args!("{subject}: {note}")));
     }
 
     /// Returns one of `parts` equal parts of this task, which reports on an input.
@@ -65,15 +61,16 @@ impl Bar {
     }
 
     /// Starts a task of unknown progress.
-    pub(crate) fn spinner(task: &str, quiet: bool) -> Self {
-        Self::start(task, quiet, "{msg:30!} {spinner} {elapsed}", "-\\|/ ")
+    pub(crate) fn spinner(task: &str, console: &Console) -> Self {
+        Self::start(task, console, "{msg:30!} {spinner} {elapsed}", "-\\|/ ")
     }
 
-    fn start(task: &str, quiet: bool, template: &str, characters: &str) -> Self {
+    fn start(task: &str, console: &Console, template: &str, characters: &str) -> Self {
         let bar = ProgressBar::with_draw_target(Some(PROGRESS_STEPS), ProgressDrawTarget::hidden())
             .with_message(task.to_owned());
-        if quiet || !stderr().is_terminal() {
-            return Self { bar, subject: String::new(), quiet, done: None, drawing: None };
+        let (subject, console) = (String::new(), console.clone());
+        if console.is_quiet() || !console.messages_to_terminal() {
+            return Self { bar, subject, console, done: None, drawing: None };
         }
         if let Ok(style) = ProgressStyle::with_template(template) {
             let spinning = template.contains("spinner");
@@ -92,7 +89,7 @@ impl Bar {
             }
             shown.finish_and_clear();
         });
-        Self { bar, subject: String::new(), quiet, done: Some(done), drawing: Some(drawing) }
+        Self { bar, subject, console, done: Some(done), drawing: Some(drawing) }
     }
 }
 
@@ -102,7 +99,7 @@ impl Progress for Bar {
     }
 
     fn cancelled(&self) -> bool {
-        interrupt::requested()
+        self.console.interrupt().requested()
     }
 
     fn note(&self, note: &str) {
@@ -137,7 +134,7 @@ impl Progress for Notes<'_> {
     fn report(&self, _fraction: f32) {}
 
     fn cancelled(&self) -> bool {
-        interrupt::requested()
+        self.bar.cancelled()
     }
 
     fn note(&self, note: &str) {
@@ -164,7 +161,7 @@ impl Progress for InputProgress<'_> {
     }
 
     fn cancelled(&self) -> bool {
-        interrupt::requested()
+        self.bar.cancelled()
     }
 
     fn note(&self, note: &str) {

@@ -73,6 +73,37 @@ impl fmt::Display for Neighbors {
     }
 }
 
+/// `--first-radius`: a radius such as `0.05`, or `best`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum FirstRadius {
+    /// The fastest radius of sufficient accuracy, found by trials.
+    Best,
+    /// A radius in the input's units.
+    Radius(f32),
+}
+
+impl FromStr for FirstRadius {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            _ if text == "best" => Ok(Self::Best),
+            Ok(radius) if radius > 0.0 && f32::is_finite(radius) => Ok(Self::Radius(radius)),
+            _ => Err("must be a number above 0, or 'best'".into()),
+        }
+    }
+}
+
+impl FirstRadius {
+    /// The radius, or a valid placeholder while the best one is unknown.
+    pub(crate) fn unless_best(self) -> f32 {
+        match self {
+            Self::Best => 1.0,
+            Self::Radius(radius) => radius,
+        }
+    }
+}
+
 /// A range of frames, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FrameRange {

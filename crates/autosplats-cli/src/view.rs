@@ -6,19 +6,14 @@ use crate::exit::Failure;
 /// Opens the window and returns when it is closed.
 #[cfg(feature = "viewer")]
 pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
-    use autosplats_viewer::{Error, Options};
+    use autosplats_viewer::Options;
 
-    use crate::exit::Exit;
     use crate::input::Inputs;
 
-    crate::threads::start_threads(&args.run)?;
     let ViewArgs { inputs, input, state, watch, backend, run: _ } = args;
     let inputs = Inputs::new(inputs, input)?.for_viewer(*watch);
     let options = Options { inputs, state: state.clone(), watch: *watch, backend: backend.map(Into::into) };
-    autosplats_viewer::run(options).map_err(|error| {
-        let exit = if matches!(error, Error::State(_)) { Exit::Input } else { Exit::Device };
-        Failure::new(exit, error)
-    })
+    Ok(autosplats_viewer::run(options)?)
 }
 
 /// Fails: this build has no window.

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::ErrorKind;
+
 /// Errors of reading, writing, playing or generating a cloud. Each message is one line.
 ///
 /// All crates of points share this type, since most errors pass through several of them.
@@ -137,6 +139,24 @@ impl Error {
     /// [`Error::Unsupported`], with `what` as [one line](one_line).
     pub fn unsupported(path: &Path, what: impl AsRef<str>) -> Self {
         Self::Unsupported { path: path.into(), what: one_line(what.as_ref()) }
+    }
+
+    /// The kind of this error.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Io { source, .. } => source.into(),
+            Self::UnknownOutput { .. } | Self::BadValue { .. } | Self::UnknownScene { .. } | Self::BadScene { .. } => {
+                ErrorKind::Argument
+            }
+            Self::AttributeLength { .. } | Self::Malformed { .. } | Self::NoSurface | Self::NoFrames { .. } => {
+                ErrorKind::Data
+            }
+            Self::UnknownFormat { .. } | Self::Unsupported { .. } => ErrorKind::Unsupported,
+            Self::Remote { .. } => ErrorKind::Io,
+            Self::OutOfMemory { .. } => ErrorKind::Memory,
+            Self::Cancelled => ErrorKind::Cancelled,
+        }
     }
 }
 

@@ -17,6 +17,7 @@ mod cloud;
 mod contents;
 mod crs;
 mod error;
+mod error_kind;
 mod files;
 mod geographic;
 mod guard;
@@ -35,6 +36,7 @@ pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use error::{Error, excerpt, one_line};
+pub use error_kind::ErrorKind;
 pub use files::{Bytes, temporary_beside, write_whole};
 pub use geographic::LocalMetres;
 /// Vector library of the public interface.

@@ -13,6 +13,7 @@
 mod align;
 mod animation;
 mod clock;
+mod input;
 mod latest;
 mod listing;
 mod live;
@@ -29,6 +30,7 @@ mod wire;
 
 pub use align::beginnings;
 pub use animation::{Animation, Playback};
+pub use input::Input;
 pub use latest::{Arrival, Latest, LatestOptions, LatestStatistics};
 pub use live::{Live, LiveOptions};
 pub use player::Player;

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 
-use autosplats::Image;
 use autosplats::cloud::write_whole;
 use eframe::egui;
 
@@ -51,20 +50,6 @@ pub(crate) fn ask_for_output(context: &egui::Context, title: &str, name: &str) -
         context.request_repaint();
     });
     receiver
-}
-
-/// Encodes a picture as PNG.
-pub(crate) fn encode_png(picture: &Image, writer: &mut dyn std::io::Write) -> std::io::Result<()> {
-    let encoder = image::codecs::png::PngEncoder::new(writer);
-    let (width, height) = (picture.width, picture.height);
-    image::ImageEncoder::write_image(
-        encoder,
-        picture.pixels.as_flattened(),
-        width,
-        height,
-        image::ExtendedColorType::Rgba8,
-    )
-    .map_err(std::io::Error::other)
 }
 
 /// Writes a file atomically: it appears complete or not at all.

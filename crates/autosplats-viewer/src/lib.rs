@@ -27,9 +27,10 @@ mod view;
 use std::path::PathBuf;
 
 use autosplats::Backend;
+use autosplats::cloud::ErrorKind;
 use eframe::egui;
 
-pub use self::session::Input;
+pub use autosplats_sources::Input;
 
 /// Options at the start of the viewer.
 #[derive(Debug, Default)]
@@ -54,6 +55,17 @@ pub enum Error {
     /// The session file could not be read.
     #[error("{0}")]
     State(String),
+}
+
+impl Error {
+    /// The kind of this error.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Window(_) => ErrorKind::Device,
+            Self::State(_) => ErrorKind::Data,
+        }
+    }
 }
 
 /// Opens the window and returns when it is closed.

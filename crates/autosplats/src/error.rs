@@ -1,5 +1,7 @@
 //! Errors of rendering and of normal estimation.
 
+use autosplats_cloud::ErrorKind;
+
 /// Longest allowed side of an image in pixels.
 pub const MAX_SIDE: u32 = 16_384;
 
@@ -102,4 +104,20 @@ pub enum Error {
     /// [`Progress::cancelled`](autosplats_cloud::Progress::cancelled) or a callback asked to stop.
     #[error("cancelled")]
     Cancelled,
+}
+
+impl Error {
+    /// The kind of this error.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Camera(_) | Self::Setting { .. } | Self::ImageSize { .. } | Self::MissingAttribute { .. } => {
+                ErrorKind::Argument
+            }
+            Self::Layers { .. } | Self::NothingVisible(_) | Self::Normals { .. } => ErrorKind::Data,
+            Self::TooManyPoints(_) | Self::DeviceLimit { .. } | Self::DeviceMemory(_) => ErrorKind::Memory,
+            Self::Device(_) | Self::DeviceLost(_) | Self::Texture(_) => ErrorKind::Device,
+            Self::Cancelled => ErrorKind::Cancelled,
+        }
+    }
 }

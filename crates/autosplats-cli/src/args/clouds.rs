@@ -40,10 +40,6 @@ pub(crate) struct ConvertArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Point processing, in this order")]
 pub(crate) struct ThinningArgs {
-    /// Sample COUNT points on the surface of each mesh, evenly by area, instead of taking its corners; such as 250000
-    /// or 1.5M
-    #[arg(long, value_name = "COUNT", value_parser = values::count)]
-    pub(crate) sample: Option<usize>,
     /// Keep the points inside a box of world coordinates, given by its lower and its upper corner
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds, allow_hyphen_values = true)]
     pub(crate) bounds: Option<[DVec3; 2]>,
@@ -110,8 +106,43 @@ Examples:
   autosplats info *.ply *.e57 --json
   autosplats info points.txt --columns x,y,z,Intensity,-,red,green,blue";
 
+/// Description of the JSON, shown by `info --help` and in docs/FORMATS.md. `Report` has these fields.
+const INFO_SCHEMA: &str = "\
+Fields of the JSON object. Unknown values are null, unknown lists empty; NaN and infinity do not
+occur. Later versions may add fields.
+  input             the name as typed
+  error             why the input could not be read, in one line
+  format            format, version and encoding, for people
+  file_bytes        size of the file in bytes
+  scanned           whether all points were read; if not, all facts are from the header
+  points            number of points; if scanned, without points at (0, 0, 0), where nothing
+                    was measured
+  points_in_header  number of points that the header states
+  faces             number of faces of a mesh
+  bounds            smallest and largest coordinates: {min: [x, y, z], max: [...], size: [...]}
+  axes              {name: z-up, y-up or camera, guessed: true if from the cloud's shape}
+  crs               {name, epsg, wkt, unit, vertical_unit, metres_per_unit}, as the file states
+  resolution        step that coordinates are multiples of: [x, y, z]
+  spacing           distance to the nearest other point, at up to 10,000 points spread over
+                    the file: {median, p5, p95, mean, samples}; p5 and p95 are percentiles
+  density           points per square unit of surface at the same points: {median, neighbors,
+                    samples}; n / (pi r^2), with r the distance to the n-th nearest
+  duplicates        points at exactly the position of an earlier one
+  not_finite        points with an infinite or NaN coordinate
+  attributes        values per point, including coordinates: {name, stored, min, max, mean,
+                    not_finite, distinct, values, histogram}
+    stored          type in the file
+    distinct        number of distinct values, if all are whole and near each other
+    values          [{value, count, name}] of up to 32 distinct values, or of all classes;
+                    name is the ASPRS class
+    histogram       {edges, counts}: up to 32 equal bins, with whole edges if all values are
+  scans             sensor poses: {name, position, world_from_sensor, points}; a row-major
+                    matrix, and [first, end] of the points that the sensor saw
+  details           further facts from the header: [{name, value}]
+  warnings          what was lost, guessed, dropped, scaled or contradictory";
+
 #[derive(Args, Debug)]
-#[command(after_help = INFO_EXAMPLES, after_long_help = format!("{INFO_EXAMPLES}\n\n{}", crate::info::SCHEMA))]
+#[command(after_help = INFO_EXAMPLES, after_long_help = format!("{INFO_EXAMPLES}\n\n{INFO_SCHEMA}"))]
 pub(crate) struct InfoArgs {
     #[arg(
         required = true,

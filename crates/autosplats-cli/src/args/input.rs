@@ -48,10 +48,10 @@ pub(crate) struct PlayingArgs {
     /// Also show all earlier points, up to 100 million
     #[arg(long, conflicts_with = "decay")]
     pub(crate) accumulate: bool,
-    /// Sample COUNT points on the surface of each mesh, which move with it, instead of taking its corners; such as
-    /// 250000 or 1.5M
+    /// Sample COUNT points on the surface of each mesh, evenly by area, instead of taking its corners; such as 250000
+    /// or 1.5M. The points move with the mesh
     #[arg(long, value_name = "COUNT", value_parser = values::count)]
-    pub(crate) strew: Option<usize>,
+    pub(crate) sample: Option<usize>,
     /// Show each mesh or scene as 1 to 4 simulated scanners around it would see it, each noisier than the one before.
     /// With 'render --color k-radius --range 0.01..0.03' red marks sparse sampling: k-radii of the upper end of the
     /// range and more

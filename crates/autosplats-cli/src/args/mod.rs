@@ -1,5 +1,6 @@
-//! The command line as typed. [`render::job`](crate::render) combines the flags of `render` into a job.
+//! The command line as typed. Each command turns its part into ready objects.
 
+mod bench;
 mod clouds;
 mod input;
 mod others;
@@ -9,13 +10,13 @@ mod view;
 
 use clap::{Args, Parser, Subcommand};
 
+pub(crate) use self::bench::{BenchArgs, Evaluation, PaperArgs};
 pub(crate) use self::clouds::{ConvertArgs, InfoArgs, NormalsArgs, ThinningArgs};
 pub(crate) use self::input::{InputArgs, PlayingArgs, ReadingArgs};
 pub(crate) use self::others::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, TopicsArgs};
-pub(crate) use self::picture::{CameraArgs, LookArgs, SurfaceArgs};
+pub(crate) use self::picture::{CameraArgs, LookArgs, NeighborArgs, SurfaceArgs};
 pub(crate) use self::render::RenderArgs;
 pub(crate) use self::view::ViewArgs;
-use crate::bench::args::BenchArgs;
 use crate::exit::EXIT_CODES;
 use crate::values;
 
@@ -61,6 +62,26 @@ pub(crate) enum Command {
     Completions(CompletionsArgs),
     /// Print the manual page, or write one page per command
     Man(ManArgs),
+}
+
+impl Command {
+    /// Options about the run; `None` for commands without such.
+    pub(crate) fn run(&self) -> Option<&RunArgs> {
+        match self {
+            Self::View(args) => Some(&args.run),
+            Self::Render(args) => Some(&args.run),
+            Self::Convert(args) => Some(&args.run),
+            Self::Normals(args) => Some(&args.run),
+            Self::Demo(args) => Some(&args.run),
+            Self::Info(args) => Some(&args.run),
+            Self::Topics(args) => Some(&args.run),
+            Self::Bench(args) => Some(match &args.evaluation {
+                Some(Evaluation::Paper(args)) => &args.run,
+                None => &args.run,
+            }),
+            Self::Doctor(_) | Self::Completions(_) | Self::Man(_) => None,
+        }
+    }
 }
 
 #[derive(Args, Debug)]

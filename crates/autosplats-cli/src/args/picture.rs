@@ -7,8 +7,7 @@ use autosplats_cloud::glam::DVec3;
 use clap::Args;
 
 use crate::choices::{AxesChoice, Backend, BacksChoice, Engine, Map, Side};
-use crate::first_radius::FirstRadius;
-use crate::values::{self, Neighbors, Ortho};
+use crate::values::{self, FirstRadius, Neighbors, Ortho};
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Camera")]
@@ -43,9 +42,10 @@ pub(crate) struct CameraArgs {
     pub(crate) axes: AxesChoice,
 }
 
+/// Which neighbours a splat is made from, and how they are found.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Surface")]
-pub(crate) struct SurfaceArgs {
+pub(crate) struct NeighborArgs {
     /// Number of neighbours that each splat is made from, 1 to 64; more is smoother. 'auto' takes 10, up to thousands
     /// where points are noisy, and turns outliers into dots or drops them
     #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
@@ -66,6 +66,22 @@ pub(crate) struct SurfaceArgs {
     /// the visible points' neighbourhoods, and keeps it for all frames
     #[arg(long, value_name = "RADIUS|best", default_value = "best", allow_negative_numbers = true)]
     pub(crate) first_radius: FirstRadius,
+}
+
+impl NeighborArgs {
+    /// Puts the options into the settings.
+    pub(crate) fn set(&self, reconstruction: &mut Reconstruction) {
+        (reconstruction.k, reconstruction.adaptive) = self.k.settings();
+        reconstruction.points_per_pixel = self.points_per_pixel;
+        reconstruction.engine = self.engine.with_first_radius(self.first_radius);
+    }
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Surface")]
+pub(crate) struct SurfaceArgs {
+    #[command(flatten)]
+    pub(crate) neighbors: NeighborArgs,
     /// Device that renders; pictures are the same except for rounding
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) backend: Backend,

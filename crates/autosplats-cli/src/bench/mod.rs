@@ -1,6 +1,5 @@
 //! `autosplats bench`: times each stage and pass of a frame, on each requested backend.
 
-pub(crate) mod args;
 mod paper;
 
 use std::time::Instant;
@@ -10,15 +9,14 @@ use autosplats_cloud::PointCloud;
 use autosplats_scenes::SCENE_PREFIX;
 use serde::Serialize;
 
-use self::args::{BenchArgs, Evaluation};
-use crate::convert::edit_failure;
+use crate::args::{BenchArgs, Evaluation};
+use crate::console::Console;
 use crate::device::Device;
-use crate::exit::{Exit, Failure};
+use crate::exit::Failure;
+use crate::first_radius::settle_first_radius;
 use crate::input::Inputs;
-use crate::output::print_line;
 use crate::progress::Bar;
-use crate::render::{render_failure, scene_camera};
-use crate::threads::start_threads;
+use crate::render::scene_camera;
 use crate::values::Neighbors;
 
 /// Frames before the measured ones, in which buffers are created, caches filled and clocks raised.
@@ -65,84 +63,61 @@ struct Run {
 }
 
 /// Renders the same frame repeatedly and prints the medians.
-pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
-    let BenchArgs {
-        evaluation,
-        scene,
-        engine,
-        first_radius,
-        backends,
-        k,
-        points_per_pixel,
-        no_trim,
-        noise,
-        size,
-        frames,
-        stream,
-        json,
-        run,
-    } = args;
+pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<(), Failure> {
+    let BenchArgs { evaluation, scene, neighbors, backends, no_trim, noise, size, frames, stream, json, run: _ } = args;
     if let Some(Evaluation::Paper(args)) = evaluation {
-        return paper::run(args);
+        return paper::run(args, console);
     }
-    start_threads(run)?;
     let mut settings = Settings::default();
-    (settings.reconstruction.k, settings.reconstruction.adaptive) = k.settings();
-    settings.reconstruction.points_per_pixel = *points_per_pixel;
+    neighbors.set(&mut settings.reconstruction);
     settings.reconstruction.trim = !no_trim;
-    settings.reconstruction.engine = engine.with_first_radius(*first_radius);
-    settings.check().map_err(render_failure)?;
+    settings.check()?;
     let name = scene.strip_prefix(SCENE_PREFIX).unwrap_or(scene);
     let inputs = Inputs::scene(name)?;
     // Missing devices fail before points are generated.
     let mut renderers = Vec::new();
     for &backend in backends {
-        let renderer = Renderer::with_backend(backend.into()).map_err(render_failure)?;
-        renderer.check(&settings).map_err(render_failure)?;
+        let renderer = Renderer::with_backend(backend.into())?;
+        renderer.check(&settings)?;
         renderers.push(renderer);
     }
-    let mut cloud = inputs.read(run.quiet)?;
+    let mut cloud = inputs.read(console)?;
     if let Some(sigma) = *noise {
-        let bar = Bar::new("adding noise", run.quiet);
-        cloud.add_noise(sigma, 0, &bar).map_err(edit_failure)?;
+        cloud.add_noise(sigma, 0, &Bar::new("adding noise", console))?;
     }
     let mut bench = Bench {
         version: env!("CARGO_PKG_VERSION"),
         scene,
         size: *size,
-        k: *k,
-        points_per_pixel: *points_per_pixel,
+        k: neighbors.k,
+        points_per_pixel: neighbors.points_per_pixel,
         trim: !no_trim,
         noise: *noise,
-        engine: engine.name(),
+        engine: neighbors.engine.name(),
         frames: *frames,
         stream: *stream,
         runs: Vec::new(),
     };
     for mut renderer in renderers {
-        bench.runs.push(measure(&mut renderer, &inputs, &cloud, &settings, args)?);
+        bench.runs.push(measure(&mut renderer, &inputs, &cloud, settings.clone(), args, console)?);
     }
-    if *json {
-        let json =
-            serde_json::to_string(&bench).map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))?;
-        print_line(&json)
-    } else {
-        print_line(&bench.table(&cloud))
-    }
+    if *json { console.print_json(&bench) } else { console.print_line(bench.table(&cloud)) }
 }
 
 fn measure(
     renderer: &mut Renderer,
     inputs: &Inputs,
     cloud: &PointCloud,
-    settings: &Settings,
+    mut settings: Settings,
     args: &BenchArgs,
+    console: &Console,
 ) -> Result<Run, Failure> {
     let device = Device::of(renderer);
     let scene = inputs.only_scene().ok_or_else(|| Failure::usage("a bench needs a scene"))?;
     let camera = scene_camera(scene);
-    let settings = &args.first_radius.settle(renderer, cloud, &camera, args.size, settings, args.run.quiet)?;
-    let bar = Bar::spinner(&format!("{} frames on {}", args.frames, device.name), args.run.quiet);
+    let first_radius = args.neighbors.first_radius;
+    settle_first_radius(&mut settings, first_radius, renderer, cloud, &camera, args.size, console)?;
+    let bar = Bar::spinner(&format!("{} frames on {}", args.frames, device.name), console);
     let mut samples: Vec<(f64, Timings, Vec<PassTime>)> = Vec::new();
     let (mut counts, mut first_upload_ms) = (Counts::default(), 0.0);
     // A renderer takes clouds of another identity as new points, so two alternating clouds are always new.
@@ -150,7 +125,7 @@ fn measure(
     for frame in 0..WARM_UP_FRAMES + args.frames {
         let cloud = other.as_ref().filter(|_| frame % 2 == 1).unwrap_or(cloud);
         let started = Instant::now();
-        let rendered = renderer.render(cloud, &camera, args.size, settings).map_err(render_failure)?;
+        let rendered = renderer.render(cloud, &camera, args.size, &settings)?;
         let picture_ms = started.elapsed().as_secs_f64() * 1e3;
         if frame == 0 {
             (counts, first_upload_ms) = (rendered.counts, rendered.timings.upload);
@@ -180,7 +155,7 @@ fn measure(
             frame: of(&|timings| timings.frame),
         },
         passes: passes.collect(),
-        unconverged: renderer.convergence().map_err(render_failure)?,
+        unconverged: renderer.convergence()?,
         device,
     })
 }
@@ -189,7 +164,7 @@ fn measure(
 fn copy(cloud: &PointCloud) -> Result<PointCloud, Failure> {
     let copy = PointCloud::new(cloud.origin(), cloud.positions().to_vec());
     let Some(colors) = cloud.colors() else { return Ok(copy) };
-    copy.with_colors(colors.to_vec()).map_err(|error| Failure::new(Exit::Input, error))
+    Ok(copy.with_colors(colors.to_vec())?)
 }
 
 /// The median of at least one value.

@@ -7,7 +7,6 @@ use autosplats::guess_axes;
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{Error, FieldValues, PointCloud, Progress, Unit, check_memory};
 use autosplats_formats::{Attribute, Description, ReadOptions, describe, read_with};
-use autosplats_scenes::Scene;
 use autosplats_sources::{PlayOptions, RecordingSummary, Source, describe_recording};
 use rayon::prelude::*;
 
@@ -15,8 +14,9 @@ use super::report::{AttributeFound, AxesFound, Bounds, CrsFound, Detail, Report,
 use super::spacing;
 use super::statistics::{Statistics, Values};
 use crate::args::InputArgs;
+use crate::console::Console;
 use crate::exit::Failure;
-use crate::input::{Inputs, read_failure};
+use crate::input::Inputs;
 use crate::progress::Bar;
 
 /// Size in bytes from which files are read one at a time. Reading one uses all cores, and two might not fit into
@@ -27,7 +27,7 @@ const LARGE_FILE_BYTES: u64 = 64 << 20;
 pub(super) struct Examiner {
     options: ReadOptions,
     scan: bool,
-    quiet: bool,
+    console: Console,
     /// Held while a large input is read.
     large: Mutex<()>,
 }
@@ -59,8 +59,8 @@ impl Progress for NoteCollector<'_> {
 }
 
 impl Examiner {
-    pub(super) fn new(options: ReadOptions, scan: bool, quiet: bool) -> Self {
-        Self { options, scan, quiet, large: Mutex::new(()) }
+    pub(super) fn new(options: ReadOptions, scan: bool, console: Console) -> Self {
+        Self { options, scan, console, large: Mutex::new(()) }
     }
 
     pub(super) fn examine(&self, name: &str) -> Examination {
@@ -68,10 +68,10 @@ impl Examiner {
         let outcome = Inputs::new(&[name.into()], &InputArgs::default()).and_then(|inputs| {
             match inputs.only() {
                 Source::File(path) => self.file(path, &mut report),
-                Source::Scene(..) => self.scene(name, &mut report),
+                scene @ Source::Scene(..) => self.scene(name, scene, &mut report),
                 moving => self.moving(name, moving, &mut report),
             }
-            .map_err(read_failure)
+            .map_err(Failure::from)
         });
         report.error = outcome.as_ref().err().map(|failure| failure.message.clone());
         Examination { report, failure: outcome.err() }
@@ -86,14 +86,14 @@ impl Examiner {
             return Ok(());
         }
         let _alone = (bytes >= LARGE_FILE_BYTES).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
-        let bar = Bar::on_file("reading", path, self.quiet);
+        let bar = Bar::on_file("reading", path, &self.console);
         let listener = NoteCollector { bar: &bar, notes: Mutex::default() };
         let cloud = read_with(path, &self.options, &listener);
         for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
             report.warn(note);
         }
         drop(bar);
-        let bar = Bar::spinner("measuring", self.quiet);
+        let bar = Bar::spinner("measuring", &self.console);
         report.scan(&cloud?, &header.attributes);
         drop(bar);
         Ok(())
@@ -101,7 +101,7 @@ impl Examiner {
 
     /// Describes a moving input by its container's summary and its first points.
     fn moving(&self, name: &str, source: &Source, report: &mut Report) -> Result<(), Error> {
-        let bar = Bar::new(&format!("reading {name}"), self.quiet);
+        let bar = Bar::new(&format!("reading {name}"), &self.console);
         let listener = NoteCollector { bar: &bar, notes: Mutex::default() };
         if let Source::Recording(path) = source {
             let summary = describe_recording(path, &listener)?;
@@ -125,12 +125,10 @@ impl Examiner {
         Ok(())
     }
 
-    fn scene(&self, name: &str, report: &mut Report) -> Result<(), Error> {
-        let (scene, count) = Scene::parse(name)?;
-        let _alone =
-            (count as u64 * 16 >= LARGE_FILE_BYTES).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
-        let bar = Bar::new(&format!("generating {name}"), self.quiet);
-        let cloud = scene.sample(count, &bar)?;
+    fn scene(&self, name: &str, scene: &Source, report: &mut Report) -> Result<(), Error> {
+        let large = scene.least_bytes() >= LARGE_FILE_BYTES;
+        let _alone = large.then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
+        let cloud = scene.read(&self.options, &Bar::new(&format!("generating {name}"), &self.console))?;
         report.format = Some("generated scene".into());
         report.scan(&cloud, &[]);
         Ok(())

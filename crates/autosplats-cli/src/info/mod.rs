@@ -7,27 +7,23 @@ mod statistics;
 mod text;
 
 use std::collections::BTreeMap;
-use std::io::{IsTerminal as _, stdout};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 
 use autosplats_formats::ReadOptions;
 
 use self::examine::{Examination, Examiner};
-pub(crate) use self::report::SCHEMA;
 pub(crate) use self::text::wrapped;
 use crate::args::InfoArgs;
+use crate::console::{Console, json};
 use crate::exit::{Exit, Failure};
-use crate::output::{print_bytes, print_line};
-use crate::threads::start_threads;
 
 /// Examines the inputs in parallel and prints the reports in the order typed.
-pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
-    start_threads(&args.run)?;
+pub(crate) fn run(args: &InfoArgs, console: &Console) -> Result<(), Failure> {
     // All digits are read, so that the report is true of the file.
     let options = ReadOptions { exact: true, ..args.reading.options() };
     let several = args.inputs.len() > 1;
-    let examiner = Examiner::new(options, args.scan, args.run.quiet || several);
+    let examiner = Examiner::new(options, args.scan, console.quiet(several));
 
     let next = AtomicUsize::new(0);
     let (sender, reports) = channel();
@@ -47,7 +43,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         }
         drop(sender);
         let mut waiting = BTreeMap::new();
-        let mut printed = Printer { json: args.json, several, failures: Vec::new() };
+        let mut printed = Printer { console, json: args.json, several, failures: Vec::new() };
         printed.begin()?;
         for (index, examination) in reports {
             waiting.insert(index, examination);
@@ -60,35 +56,34 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
 }
 
 /// Prints reports as they come.
-struct Printer {
+struct Printer<'a> {
+    console: &'a Console,
     json: bool,
     several: bool,
     /// For each printed input, why it could not be read.
     failures: Vec<Option<Failure>>,
 }
 
-impl Printer {
+impl Printer<'_> {
     fn begin(&self) -> Result<(), Failure> {
-        if self.json && self.several { print_line("[") } else { Ok(()) }
+        if self.json && self.several { self.console.print_line("[") } else { Ok(()) }
     }
 
     fn print(&mut self, Examination { report, failure }: Examination) -> Result<(), Failure> {
         if self.json {
             if !self.failures.is_empty() {
-                print_line(",")?;
+                self.console.print(",\n")?;
             }
-            let json = serde_json::to_string(&report)
-                .map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))?;
-            print_bytes(json.as_bytes())?;
+            self.console.print(json(&report)?)?;
         } else if report.is_known() {
             let gap = if self.failures.is_empty() { "" } else { "\n" };
-            let styled = stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-            print_bytes(format!("{gap}{}", report.to_text(styled)).as_bytes())?;
+            let styled = self.console.data_to_terminal() && std::env::var_os("NO_COLOR").is_none();
+            self.console.print(format!("{gap}{}", report.to_text(styled)))?;
         }
         if let Some(failure) = &failure
             && self.several
         {
-            eprintln!("error: {}", failure.message);
+            self.console.error(&failure.message);
         }
         self.failures.push(failure);
         Ok(())
@@ -96,7 +91,7 @@ impl Printer {
 
     fn end(self) -> Result<(), Failure> {
         if self.json {
-            print_line(if self.several { "\n]" } else { "" })?;
+            self.console.print_line(if self.several { "\n]" } else { "" })?;
         }
         let inputs = self.failures.len();
         let mut failures: Vec<Failure> = self.failures.into_iter().flatten().collect();

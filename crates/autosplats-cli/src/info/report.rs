@@ -6,41 +6,6 @@ use serde::Serialize;
 use super::spacing::{Density, Spacing};
 use super::statistics::Statistics;
 
-/// Description of the JSON, shown by `info --help` and in docs/FORMATS.md.
-pub(crate) const SCHEMA: &str = "\
-Fields of the JSON object. Unknown values are null, unknown lists empty; NaN and infinity do not
-occur. Later versions may add fields.
-  input             the name as typed
-  error             why the input could not be read, in one line
-  format            format, version and encoding, for people
-  file_bytes        size of the file in bytes
-  scanned           whether all points were read; if not, all facts are from the header
-  points            number of points; if scanned, without points at (0, 0, 0), where nothing
-                    was measured
-  points_in_header  number of points that the header states
-  faces             number of faces of a mesh
-  bounds            smallest and largest coordinates: {min: [x, y, z], max: [...], size: [...]}
-  axes              {name: z-up, y-up or camera, guessed: true if from the cloud's shape}
-  crs               {name, epsg, wkt, unit, vertical_unit, metres_per_unit}, as the file states
-  resolution        step that coordinates are multiples of: [x, y, z]
-  spacing           distance to the nearest other point, at up to 10,000 points spread over
-                    the file: {median, p5, p95, mean, samples}; p5 and p95 are percentiles
-  density           points per square unit of surface at the same points: {median, neighbors,
-                    samples}; n / (pi r^2), with r the distance to the n-th nearest
-  duplicates        points at exactly the position of an earlier one
-  not_finite        points with an infinite or NaN coordinate
-  attributes        values per point, including coordinates: {name, stored, min, max, mean,
-                    not_finite, distinct, values, histogram}
-    stored          type in the file
-    distinct        number of distinct values, if all are whole and near each other
-    values          [{value, count, name}] of up to 32 distinct values, or of all classes;
-                    name is the ASPRS class
-    histogram       {edges, counts}: up to 32 equal bins, with whole edges if all values are
-  scans             sensor poses: {name, position, world_from_sensor, points}; a row-major
-                    matrix, and [first, end] of the points that the sensor saw
-  details           further facts from the header: [{name, value}]
-  warnings          what was lost, guessed, dropped, scaled or contradictory";
-
 /// All facts about one input.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Report {

@@ -10,9 +10,9 @@ use crate::exit::{Exit, Failure};
 /// Reads a pose from a text file: a row-major 4x4 or 3x4 matrix, or a translation and a quaternion. Blanks or commas
 /// separate the numbers, `#` begins a comment.
 pub(super) fn read_pose(path: &Path) -> Result<DMat4, Failure> {
-    let text =
-        read_to_string(path).map_err(|error| Failure::new(Exit::Input, format!("{}: {error}", path.display())))?;
-    parse_pose(&text).map_err(|what| Failure::new(Exit::Input, format!("{}: {what}", path.display())))
+    let text = read_to_string(path).map_err(|error| error.to_string());
+    let bad = |what: String| Failure::new(Exit::Input, format!("{}: {what}", path.display()));
+    text.and_then(|text| parse_pose(&text)).map_err(bad)
 }
 
 fn parse_pose(text: &str) -> Result<DMat4, String> {

@@ -10,9 +10,9 @@ use autosplats_cloud::{Axes, PointCloud};
 use autosplats_scenes::{Scene, View};
 use serde_json::error::Category;
 
-use super::render_failure;
 use crate::args::CameraArgs;
 use crate::choices::{AxesChoice, Side};
+use crate::console::Console;
 use crate::exit::Failure;
 use crate::output::write_file;
 use crate::values::Ortho;
@@ -84,7 +84,7 @@ impl CameraJob {
         let axes = self.axes.unwrap_or_else(|| guess_axes(cloud));
         let fitted_by = |view, projection| {
             let aspect = f64::from(size[0]) / f64::from(size[1]);
-            Camera::fit(cloud, axes, direction(view), aspect, projection).map_err(render_failure)
+            Camera::fit(cloud, axes, direction(view), aspect, projection)
         };
         let fitted = |view| fitted_by(view, self.projection());
         let mut camera = match self.place {
@@ -112,7 +112,7 @@ impl CameraJob {
             (_, Some(Ortho(Some(height)))) => camera.projection = Projection::OrthographicHeight(height),
             _ => {}
         }
-        camera.axes().map_err(render_failure)?;
+        camera.axes()?;
         Ok((camera, axes))
     }
 
@@ -169,8 +169,8 @@ fn load(path: &Path) -> Result<Camera, Failure> {
 }
 
 /// Writes a camera as JSON and returns the file's size in bytes.
-pub(super) fn save(path: &Path, camera: &Camera) -> Result<u64, Failure> {
-    write_file(path, |writer| {
+pub(super) fn save(path: &Path, camera: &Camera, console: &Console) -> Result<u64, Failure> {
+    write_file(path, console, |writer| {
         serde_json::to_writer_pretty(&mut *writer, camera).map_err(Error::other)?;
         writeln!(writer)
     })

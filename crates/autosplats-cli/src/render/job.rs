@@ -11,18 +11,16 @@ use autosplats_cloud::{PointCloud, check_memory};
 
 use super::camera::CameraJob;
 use super::film::FilmJob;
-use super::render_failure;
 use crate::args::{LookArgs, RenderArgs, SurfaceArgs};
 use crate::choices::Map;
+use crate::console::Console;
 use crate::exit::{Exit, Failure, suggest};
-use crate::first_radius::FirstRadius;
-use crate::input::{Inputs, read_failure};
+use crate::first_radius::settle_first_radius;
+use crate::input::Inputs;
 use crate::output::{Format, Picture, ReadFiles, check_target};
-use crate::threads::start_threads;
-use crate::values::COLOR_MODES;
+use crate::values::{COLOR_MODES, FirstRadius};
 
 /// A picture to render: everything except the points.
-#[derive(Debug)]
 pub(super) struct Job {
     pub(super) inputs: Inputs,
     pub(super) pictures: Vec<Picture>,
@@ -40,12 +38,12 @@ pub(super) struct Job {
     pub(super) backend: Backend,
     pub(super) first_radius: FirstRadius,
     pub(super) json: bool,
-    pub(super) quiet: bool,
+    pub(super) console: Console,
 }
 
 impl Job {
     /// Checks flags, inputs and output paths. A film job, if frames are requested, replaces the single pictures.
-    pub(super) fn new(args: RenderArgs) -> Result<(Self, Option<FilmJob>), Failure> {
+    pub(super) fn new(args: RenderArgs, console: &Console) -> Result<(Self, Option<FilmJob>), Failure> {
         let RenderArgs {
             inputs,
             input,
@@ -58,10 +56,9 @@ impl Job {
             camera,
             surface,
             look,
-            run,
+            run: _,
             json,
         } = args;
-        start_threads(&run)?;
         let fps = input.playing.fps;
         let film = FilmJob::new(&outputs, frames, resume, fps, watch)?;
         let pictures = match &film {
@@ -83,7 +80,7 @@ impl Job {
             ));
         }
         let settings = settings(&surface, look, needs_layers);
-        settings.check().map_err(render_failure)?;
+        settings.check()?;
 
         let save_camera = camera.save_camera.clone();
         let inputs = Inputs::new(&inputs, &input)?;
@@ -96,7 +93,7 @@ impl Job {
             if !seen.insert(target) {
                 return Err(Failure::usage(format!("{}: two outputs have this name", target.display())));
             }
-            check_target(target, &read_files)?;
+            check_target(target, &read_files, console)?;
         }
         let [width, height] = size.map(|side| u64::from(side) * u64::from(supersample));
         if width.max(height) > u64::from(MAX_SIDE) {
@@ -104,14 +101,12 @@ impl Job {
                 "--supersample {supersample}: {width}x{height} pixels are too many, each side may have {MAX_SIDE}"
             )));
         }
-        check_memory(&format!("a picture of {width}x{height}"), width * height * BYTES_PER_PIXEL)
-            .map_err(read_failure)?;
-        let SurfaceArgs { backend, first_radius, .. } = surface;
-        let (backend, quiet) = (backend.into(), run.quiet);
+        check_memory(&format!("a picture of {width}x{height}"), width * height * BYTES_PER_PIXEL)?;
+        let (backend, first_radius) = (surface.backend.into(), surface.neighbors.first_radius);
         let shading = &settings.shading;
         let is_scaled = shading.legend || shading.range.is_some();
-        if !quiet && is_scaled && shading.color.usual_map().is_none() {
-            eprintln!("note: --legend and --range are ignored; they need colours of a value, such as --color height");
+        if is_scaled && shading.color.usual_map().is_none() {
+            console.note("--legend and --range are ignored; they need colours of a value, such as --color height");
         }
         let job = Self {
             inputs,
@@ -126,7 +121,7 @@ impl Job {
             backend,
             first_radius,
             json,
-            quiet,
+            console: console.clone(),
         };
         Ok((job, film))
     }
@@ -144,8 +139,8 @@ impl Job {
         camera: &Camera,
     ) -> Result<(), Failure> {
         let size = self.rendered_size();
-        self.settings = self.first_radius.settle(renderer, cloud, camera, size, &self.settings, self.quiet)?;
-        Ok(())
+        let Self { settings, first_radius, console, .. } = self;
+        settle_first_radius(settings, *first_radius, renderer, cloud, camera, size, console)
     }
 
     /// Renders a cloud of any number of points, also none.
@@ -155,13 +150,31 @@ impl Job {
         cloud: &PointCloud,
         camera: &Camera,
     ) -> Result<Frame<'a>, Failure> {
+        Ok(renderer.render(cloud, camera, self.rendered_size(), &self.settings_for(cloud))?)
+    }
+
+    /// Fixes what all pictures share, by the first of them.
+    pub(super) fn settle(
+        &mut self,
+        renderer: &mut Renderer,
+        cloud: &PointCloud,
+        camera: &Camera,
+    ) -> Result<(), Failure> {
+        let mut settings = self.settings_for(cloud);
+        renderer.settle(&mut settings, cloud, camera, self.rendered_size())?;
+        self.settings.shading = settings.shading;
+        Ok(())
+    }
+
+    /// The settings for a cloud of any number of points, also none.
+    fn settings_for(&self, cloud: &PointCloud) -> Settings {
         let mut settings = self.settings.clone();
         if cloud.is_empty() {
             // An empty cloud has no colours; the picture shows the background.
             settings.shading.color = ColorMode::Plain;
         }
         settings.reconstruction.k = settings.reconstruction.k.min(cloud.len().saturating_sub(1).max(1) as u32);
-        renderer.render(cloud, camera, self.rendered_size(), &settings).map_err(render_failure)
+        settings
     }
 
     /// Whether the background is transparent.
@@ -194,8 +207,10 @@ impl Job {
         shading.exposure = Some(exposure);
         let shown = shading.lighting && matches!(shading.color, ColorMode::Auto | ColorMode::Rgb);
         // Smaller factors are invisible.
-        if shown && exposure >= 1.05 && !self.quiet {
-            eprintln!("note: dark colours are shown {exposure:.1} times as bright; --exposure 1 keeps them dark");
+        if shown && exposure >= 1.05 {
+            let note =
+                format_args!("dark colours are shown {exposure:.1} times as bright; --exposure 1 keeps them dark");
+            self.console.note(note);
         }
     }
 
@@ -226,12 +241,7 @@ impl Job {
 }
 
 fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings {
-    let (k, adaptive) = surface.k.settings();
-    let reconstruction = Reconstruction {
-        k,
-        points_per_pixel: surface.points_per_pixel,
-        adaptive,
-        engine: surface.engine.with_first_radius(surface.first_radius),
+    let mut reconstruction = Reconstruction {
         outlier_expansions: (!surface.keep_outliers).then_some(surface.e0),
         gap_factor: (!surface.bridge_gaps).then_some(surface.gap_factor),
         splat_scale: surface.splat_scale,
@@ -242,6 +252,7 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
         frames_averaged: surface.frames_averaged,
         ..Reconstruction::default()
     };
+    surface.neighbors.set(&mut reconstruction);
     let shading = Shading {
         color: look.color,
         range: look.range,

@@ -5,18 +5,18 @@ use std::time::{Duration, Instant};
 
 use autosplats::{Camera, Renderer};
 use autosplats_cloud::{Error, PointCloud};
-use autosplats_film::Target;
+use autosplats_output::Target;
 use autosplats_sources::{Player, Statistics};
 
-use super::film::{FilmJob, FrameTally, picture};
+use super::film::FilmJob;
 use super::job::Job;
-use super::moving::SharedPlacement;
-use super::pictures::{FrameReport, QueuedPicture, Writer};
+use super::pictures::{FrameReport, FrameTally, QueuedPicture, Writer};
+use super::placement::SharedPlacement;
 use super::{camera, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
-use crate::input::{Playing, read_failure};
-use crate::interrupt;
+use crate::input::Playing;
+use crate::interrupt::Interrupt;
 use crate::output::check_target;
 use crate::progress::{Bar, Notes};
 
@@ -35,10 +35,11 @@ pub(super) fn run(
         let name = job.inputs.names();
         return Err(Failure::usage(format!("--resume: {name} is live, and its earlier frames do not come again")));
     }
-    let bar = Bar::spinner("rendering live input", job.quiet);
-    let mut streams = Streams::new(playing, &bar)?;
+    let bar = Bar::spinner("rendering live input", &job.console);
+    let interrupt = job.console.interrupt().clone();
+    let mut streams = Streams::new(playing, &bar, interrupt.clone())?;
     // Pictures rendered so far are kept, also as a film.
-    interrupt::end_gently();
+    interrupt.end_gently();
     let rate = film.fps.unwrap_or(schedule::DEFAULT_FPS);
     // A pipe's frames come as fast as they are read, so arrival times may be meaningless.
     let evenly = film.fps.is_some() && job.inputs.come_by_pipe() && !film.watch;
@@ -46,12 +47,12 @@ pub(super) fn run(
     let mut tally = FrameTally::default();
     let mut place = SharedPlacement::default();
     let (mut first_frame, mut frame): (Option<First>, usize) = (None, 0);
-    let writer = Writer::start(film.style(job, rate));
+    let writer = Writer::start(job, film, rate);
     let is_film = matches!(film.target, Target::Film(_));
     // The film shows the last picture until the next one comes, at a time that is still unknown.
     let mut shown: Option<QueuedPicture> = None;
     let mut render_all = || {
-        while !interrupt::ending() && film.frames.last.is_none_or(|last| frame <= last) {
+        while !interrupt.ending() && film.frames.last.is_none_or(|last| frame <= last) {
             let waited = Instant::now();
             let Some(cloud) = streams.next(&mut place)? else { break };
             if cloud.len() < 2 && first_frame.is_none() || frame < film.frames.first {
@@ -65,8 +66,8 @@ pub(super) fn run(
                 None => {
                     let camera = place.settle(job, renderer, &cloud, Arc::clone(&cloud))?;
                     if let Some(path) = &job.save_camera {
-                        check_target(path, &job.read_files)?;
-                        camera::save(path, &camera)?;
+                        check_target(path, &job.read_files, &job.console)?;
+                        camera::save(path, &camera, &job.console)?;
                     }
                     first_frame.insert(First { frame, came: Instant::now(), camera, rate: evenly.then_some(rate) })
                 }
@@ -77,7 +78,7 @@ pub(super) fn run(
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let path = film.file(frame);
             let report = FrameReport { frame, seconds, path, pictures: None, counts, read_ms, timings_ms };
-            let mut shot = Some(QueuedPicture { image: picture(job, &rendered, &writer), report });
+            let mut shot = Some(QueuedPicture { image: writer.picture(job, &rendered), report });
             if is_film {
                 std::mem::swap(&mut shot, &mut shown);
             }
@@ -102,17 +103,15 @@ pub(super) fn run(
     drop(streams);
     drop(bar);
     if tally.written == 0 {
-        if interrupt::ending() {
+        if interrupt.ending() {
             return Err(Failure::interrupted());
         }
         let why = waiting.or(last_refusal).map_or_else(String::new, |why| format!(": {why}"));
         return Err(Failure::new(Exit::Input, format!("{}: no points arrived{why}", job.inputs.names())));
     }
-    if !job.quiet {
-        let of = |count: u64, what: &str| if count > 0 { format!(", {count} {what}") } else { String::new() };
-        let more = of(dropped, "updates skipped for newer ones") + &of(refused, "refused");
-        tally.summarize(film, &more, begun, device);
-    }
+    let of = |count: u64, what: &str| if count > 0 { format!(", {count} {what}") } else { String::new() };
+    let more = of(dropped, "updates skipped for newer ones") + &of(refused, "refused");
+    tally.summarize(film, &more, begun, device, &job.console);
     Ok(())
 }
 
@@ -149,6 +148,7 @@ fn hand_over(mut shot: QueuedPicture, until: Option<f64>, rate: f64, tally: &mut
 /// Inputs of which some are live; the others are static.
 struct Streams<'a> {
     inputs: Vec<Stream<'a>>,
+    interrupt: Interrupt,
 }
 
 struct Stream<'a> {
@@ -162,7 +162,7 @@ struct Stream<'a> {
 }
 
 impl<'a> Streams<'a> {
-    fn new(playing: Vec<Playing>, bar: &'a Bar) -> Result<Self, Failure> {
+    fn new(playing: Vec<Playing>, bar: &'a Bar, interrupt: Interrupt) -> Result<Self, Failure> {
         let open = |mut input: Playing| {
             let notes = Notes::new(bar, &input.name);
             let (mut cloud, mut ended) = (None, false);
@@ -171,16 +171,16 @@ impl<'a> Streams<'a> {
                     let why = "has its own timeline and cannot be shown together with live input";
                     return Err(Failure::usage(format!("{} {why}", input.name)));
                 }
-                (cloud, ended) = (Some(input.player.frame(0, &notes).map_err(read_failure)?), true);
+                (cloud, ended) = (Some(input.player.frame(0, &notes)?), true);
             }
             Ok(Stream { input, notes, cloud, ended, waiting: None })
         };
-        Ok(Self { inputs: playing.into_iter().map(open).collect::<Result<_, _>>()? })
+        Ok(Self { inputs: playing.into_iter().map(open).collect::<Result<_, _>>()?, interrupt })
     }
 
     /// Waits for an update and returns all current points; `None` if all streams ended or Ctrl-C was pressed.
     fn next(&mut self, place: &mut SharedPlacement) -> Result<Option<Arc<PointCloud>>, Failure> {
-        while !interrupt::ending() && self.inputs.iter().any(|stream| !stream.ended) {
+        while !self.interrupt.ending() && self.inputs.iter().any(|stream| !stream.ended) {
             let mut news = false;
             for stream in self.inputs.iter_mut().filter(|stream| !stream.ended) {
                 news |= stream.listen()?;
@@ -224,7 +224,7 @@ impl Stream<'_> {
             Ok(None) => {}
             // This error means that no further frames will come.
             Err(Error::NoFrames { .. }) => self.ended = true,
-            Err(error) => return Err(read_failure(error)),
+            Err(error) => return Err(error.into()),
         }
         let waiting = self.player().stream().statistics().waiting;
         if waiting != self.waiting {

@@ -6,36 +6,40 @@ mod job;
 mod live;
 mod moving;
 mod pictures;
+mod placement;
 mod report;
 mod schedule;
 
 use std::time::Instant;
 
-use autosplats::{Camera, Counts, Error, Frame, Renderer};
+use autosplats::{Camera, Counts, Frame, Renderer};
 use autosplats_cloud::Axes;
+use autosplats_output::{write_exr, write_png};
 
 pub(crate) use self::camera::scene_camera;
+use self::film::FilmJob;
 use self::job::Job;
 use self::report::Report;
 use crate::args::RenderArgs;
+use crate::console::Console;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
-use crate::output::{Format, Picture, print_line, write_exr, write_file, write_png};
+use crate::output::{Format, Picture, write_file};
 use crate::progress::Bar;
 
 /// Renders one picture to one or several files, or a picture per frame of moving input.
-pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
-    let (mut job, film) = Job::new(args)?;
+pub(crate) fn run(args: RenderArgs, console: &Console) -> Result<(), Failure> {
+    let (mut job, film) = Job::new(args, console)?;
     // A missing device fails before anything is read.
-    let mut renderer = Renderer::with_backend(job.backend).map_err(render_failure)?;
-    renderer.check(&job.settings).map_err(render_failure)?;
+    let mut renderer = Renderer::with_backend(job.backend)?;
+    renderer.check(&job.settings)?;
     let device = Device::of(&renderer);
     if let Some(film) = film {
-        return film::run(&mut job, &film, &mut renderer, &device);
+        return render_frames(&mut job, &film, &mut renderer, &device);
     }
 
     let started = Instant::now();
-    let mut cloud = job.inputs.read(job.quiet)?;
+    let mut cloud = job.inputs.read(console)?;
     let degrees = cloud.to_local_metres();
     let read = milliseconds_since(started);
 
@@ -52,7 +56,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     }
     notes.extend(fewer);
     let placed = Placed { camera, axes, read, notes };
-    let bar = Bar::spinner("rendering", job.quiet);
+    let bar = Bar::spinner("rendering", console);
     match job.render(&mut renderer, &cloud, &camera) {
         // A device may lack the memory for supersampling by default; the picture is then rendered without.
         Err(failure) if failure.exit == Exit::Memory && job.supersample > 1 && job.supersample_is_default => {}
@@ -61,6 +65,19 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     job.supersample = 1;
     let frame = job.render(&mut renderer, &cloud, &camera)?;
     placed.conclude(&job, &device, bar, frame)
+}
+
+/// Renders a picture per frame of the inputs.
+fn render_frames(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device: &Device) -> Result<(), Failure> {
+    if film.watch {
+        job.inputs.check_watched(film.file(0).as_deref())?;
+    }
+    let playing = job.inputs.play(film.watch, &job.console)?;
+    if playing.iter().any(|input| input.player.stream().timeline().is_none()) {
+        live::run(job, film, playing, renderer, device)
+    } else {
+        moving::run(job, film, playing, renderer, device)
+    }
 }
 
 /// Facts known before a picture is rendered.
@@ -79,33 +96,29 @@ impl Placed {
         let Self { camera, axes, read, notes } = self;
         drop(bar);
         check_visible(&frame, job)?;
-        if !job.quiet {
-            notes.iter().for_each(|note| eprintln!("note: {note}"));
-        }
+        notes.iter().for_each(|note| job.console.note(note));
         let started = Instant::now();
         let mut written = Vec::new();
         for picture in &job.pictures {
-            let _bar = Bar::spinner(&format!("writing {}", picture.path.display()), job.quiet);
+            let _bar = Bar::spinner(&format!("writing {}", picture.path.display()), &job.console);
             written.push((picture.path.clone(), write_picture(picture, &frame, &camera, job)?));
         }
         if let Some(path) = &job.save_camera {
-            written.push((path.clone(), camera::save(path, &camera)?));
+            written.push((path.clone(), camera::save(path, &camera, &job.console)?));
         }
         let write = milliseconds_since(started);
 
         let report = Report::new(job, device, camera, axes, &frame, written, [read, write]);
         if job.json {
-            print_line(&report.to_json()?)?;
+            job.console.print_json(&report)?;
         }
-        if !job.quiet {
-            report.summarize();
-        }
+        job.console.tell(report.summary());
         Ok(())
     }
 }
 
 fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, job: &Job) -> Result<u64, Failure> {
-    write_file(&picture.path, |writer| match picture.format {
+    write_file(&picture.path, &job.console, |writer| match picture.format {
         Format::Png if job.supersample > 1 => {
             write_png(&frame.image.averaged(job.supersample), job.transparent(), writer)
         }
@@ -134,31 +147,6 @@ fn check_visible(frame: &Frame<'_>, job: &Job) -> Result<(), Failure> {
         )
     };
     Err(Failure::new(Exit::Input, format!("{}: nothing to show: {why}", job.inputs.names())))
-}
-
-/// The failure with the exit code of a render error.
-pub(crate) fn render_failure(error: Error) -> Failure {
-    match error {
-        Error::Setting { name, value, range } => {
-            let or = if name == "k" { ", or 'auto'" } else { "" };
-            Failure::usage(format!("{} {value}: it must be {range}{or}", flag(name)))
-        }
-        Error::Camera(_) | Error::MissingAttribute { .. } | Error::ImageSize { .. } => Failure::usage(error),
-        Error::TooManyPoints(_) | Error::DeviceLimit { .. } | Error::DeviceMemory(_) => {
-            Failure::new(Exit::Memory, error)
-        }
-        Error::Device(_) | Error::DeviceLost(_) | Error::Texture(_) => Failure::new(Exit::Device, error),
-        _ => Failure::new(Exit::Input, error),
-    }
-}
-
-/// Flag of a field of the settings.
-fn flag(setting: &str) -> String {
-    match setting {
-        "k" => "-k".into(),
-        "outlier_expansions" => "--e0".into(),
-        name => format!("--{}", name.replace('_', "-")),
-    }
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

@@ -1,34 +1,130 @@
-//! Inputs with timelines: the points at each frame.
+//! Pictures of inputs with timelines: the requested frames, each with the points of its time.
 
 use std::ops::Range;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use autosplats::{Camera, ColorMode, Renderer};
+use autosplats::{Camera, Renderer};
 use autosplats_cloud::glam::DMat4;
-use autosplats_cloud::{Axes, LocalMetres, PointCloud, Progress};
+use autosplats_cloud::{PointCloud, Progress};
+use autosplats_output::Target;
 use autosplats_sources::Timeline;
 
+use super::film::FilmJob;
 use super::job::Job;
+use super::pictures::{FrameReport, FrameTally, QueuedPicture, Writer};
+use super::placement::SharedPlacement;
+use super::{camera, schedule};
+use crate::device::Device;
 use crate::exit::{Exit, Failure};
-use crate::input::{Playing, read_failure};
-use crate::progress::Bar;
+use crate::input::Playing;
+use crate::output::check_target;
+use crate::progress::{Bar, Notes};
 
 /// Most frames that the camera is placed by.
 const MAX_CAMERA_FRAMES: usize = 5;
 
+/// Renders the requested frames.
+pub(super) fn run(
+    job: &mut Job,
+    film: &FilmJob,
+    playing: Vec<Playing>,
+    renderer: &mut Renderer,
+    device: &Device,
+) -> Result<(), Failure> {
+    for Playing { name, begins, .. } in &playing {
+        if let Some(begins) = begins.filter(|begins| !begins.is_zero()) {
+            let seconds = begins.as_secs_f64();
+            job.console.note(format_args!("{name}: begins {seconds:.3} s after the first input, by its time stamps"));
+        }
+    }
+    let mut scene = Moving::new(playing, job.inputs.names());
+    let there = scene.times.len();
+    let frames = film.frames.first..film.frames.last.map_or(there, |last| last.saturating_add(1)).min(there);
+    let has = || {
+        let plural = if there == 1 { "" } else { "s" };
+        format!("{} has {there} frame{plural}, 0 to {}", job.inputs.names(), there.saturating_sub(1))
+    };
+    if frames.is_empty() {
+        return Err(Failure::usage(format!("--frames: {}", has())));
+    }
+    if film.frames.last.is_some_and(|last| last >= there) {
+        job.console.note(has());
+    }
+    for file in frames.clone().filter_map(|frame| film.file(frame)) {
+        job.read_files.check(&file)?;
+        if job.save_camera.as_ref() == Some(&file) {
+            return Err(Failure::usage(format!("{}: two outputs have this name", file.display())));
+        }
+    }
+    let times = &scene.times[frames.clone()];
+    let rate = film.fps.unwrap_or_else(|| schedule::rate(times));
+    let shown: Vec<(usize, Option<usize>)> = match &film.target {
+        Target::Frames(_) => frames.clone().map(|frame| (frame, None)).collect(),
+        Target::Film(_) => {
+            let shown = schedule::resample(times, rate, &job.inputs.names())?;
+            shown.into_iter().map(|(frame, pictures)| (frames.start + frame, Some(pictures))).collect()
+        }
+    };
+
+    let camera = scene.settle(job, renderer, &frames)?;
+    if let Some(path) = &job.save_camera {
+        check_target(path, &job.read_files, &job.console)?;
+        camera::save(path, &camera, &job.console)?;
+    }
+    let bar = Bar::new(&format!("rendering {} frames", shown.len()), &job.console);
+    let notes = Notes::new(&bar, &job.inputs.names());
+    let begun = Instant::now();
+    let mut tally = FrameTally::default();
+    let writer = Writer::start(job, film, rate);
+    let mut render_all = || {
+        for (number, &(frame, pictures)) in shown.iter().enumerate() {
+            if bar.cancelled() {
+                return Err(Failure::interrupted());
+            }
+            let path = film.file(frame);
+            if film.resume && path.as_ref().is_some_and(|path| path.exists()) {
+                tally.kept += 1;
+                continue;
+            }
+            let started = Instant::now();
+            let cloud = scene.frame(frame, &notes)?;
+            let read_ms = super::milliseconds_since(started);
+            let rendered = job.render(renderer, &cloud, &camera)?;
+            tally.count(frame, &rendered);
+            let (counts, timings_ms) = (rendered.counts, rendered.timings);
+            let seconds = scene.times[frame] as f64 / 1e9;
+            let report = FrameReport { frame, seconds, path, pictures, counts, read_ms, timings_ms };
+            if !writer.put(QueuedPicture { image: writer.picture(job, &rendered), report }) {
+                // The writer has failed and reports why.
+                return Ok(());
+            }
+            tally.written += pictures.unwrap_or(1);
+            bar.report((number + 1) as f32 / shown.len() as f32);
+        }
+        Ok(())
+    };
+    let rendered = render_all();
+    let written = writer.finish(rendered.is_ok());
+    rendered.and(written)?;
+    drop(bar);
+    let kept = if tally.kept > 0 { format!(", {} existed", tally.kept) } else { String::new() };
+    tally.summarize(film, &kept, begun, device, &job.console);
+    Ok(())
+}
+
 /// Inputs with timelines, played together.
-pub(super) struct Moving {
+struct Moving {
     playing: Vec<Playing>,
     /// Times at which something changes, in nanoseconds since the common start.
-    pub(super) times: Vec<i64>,
+    times: Vec<i64>,
     place: SharedPlacement,
     /// Names of the inputs, for messages.
     names: String,
 }
 
 impl Moving {
-    pub(super) fn new(playing: Vec<Playing>, names: String) -> Self {
+    fn new(playing: Vec<Playing>, names: String) -> Self {
         let times_of = |input: &Playing| {
             let stamps = input.player.stream().timeline().map_or(&[][..], Timeline::stamps);
             let first = stamps.first().copied().unwrap_or_default();
@@ -48,7 +144,7 @@ impl Moving {
     }
 
     /// The points at a frame.
-    pub(super) fn points(&mut self, frame: usize, progress: &dyn Progress) -> Result<Arc<PointCloud>, Failure> {
+    fn points(&mut self, frame: usize, progress: &dyn Progress) -> Result<Arc<PointCloud>, Failure> {
         let time = Duration::from_nanos(u64::try_from(self.times[frame]).unwrap_or_default());
         let single = self.playing.len() == 1;
         let mut parts: Vec<(Arc<PointCloud>, DMat4)> = Vec::new();
@@ -56,19 +152,14 @@ impl Moving {
             let at = |timeline: &Timeline| timeline.frame_at(time.saturating_sub(begins.unwrap_or_default()));
             // Frames of a single input may share a time, so its frames are taken by number.
             let own = if single { frame } else { player.stream().timeline().map_or(0, at) };
-            parts.push((player.frame(own, progress).map_err(read_failure)?, *world_from_input));
+            parts.push((player.frame(own, progress)?, *world_from_input));
         }
         Ok(self.place.merge(parts))
     }
 
     /// Places the camera so that it sees all frames, and fixes the settings that depend on the points.
-    pub(super) fn settle(
-        &mut self,
-        job: &mut Job,
-        renderer: &mut Renderer,
-        frames: &Range<usize>,
-    ) -> Result<Camera, Failure> {
-        let bar = Bar::on_input("placing the camera", &self.names, job.quiet);
+    fn settle(&mut self, job: &mut Job, renderer: &mut Renderer, frames: &Range<usize>) -> Result<Camera, Failure> {
+        let bar = Bar::on_input("placing the camera", &self.names, &job.console);
         let last = frames.len() - 1;
         let count = frames.len().min(MAX_CAMERA_FRAMES);
         let mut looks: Vec<usize> = (0..count).map(|look| frames.start + last * look / (count - 1).max(1)).collect();
@@ -89,76 +180,8 @@ impl Moving {
     }
 
     /// The points at a frame, ready for rendering.
-    pub(super) fn frame(&mut self, frame: usize, progress: &dyn Progress) -> Result<Arc<PointCloud>, Failure> {
+    fn frame(&mut self, frame: usize, progress: &dyn Progress) -> Result<Arc<PointCloud>, Failure> {
         let cloud = self.points(frame, progress)?;
         Ok(self.place.upright(cloud))
-    }
-}
-
-/// Conversion to metres and up axis, fixed by the first points so that all pictures share them.
-#[derive(Default)]
-pub(super) struct SharedPlacement {
-    /// Conversion of degrees to metres.
-    metres: Option<LocalMetres>,
-    axes: Option<Axes>,
-}
-
-impl SharedPlacement {
-    /// Merges inputs with their poses.
-    pub(super) fn merge(&mut self, mut parts: Vec<(Arc<PointCloud>, DMat4)>) -> Arc<PointCloud> {
-        let mut cloud = match parts.pop() {
-            Some((only, pose)) if parts.is_empty() && pose == DMat4::IDENTITY => only,
-            Some(last) => {
-                parts.push(last);
-                let parts: Vec<_> = parts.iter().map(|(cloud, pose)| (&**cloud, *pose)).collect();
-                Arc::new(PointCloud::merged(&parts))
-            }
-            None => Arc::default(),
-        };
-        if self.metres.is_none() && !cloud.is_empty() {
-            self.metres = cloud.local_metres(None);
-        }
-        if let Some(metres) = &self.metres {
-            Arc::make_mut(&mut cloud).to_metres_on(metres);
-        }
-        cloud
-    }
-
-    /// Places the camera for `all` points. Fixes by the `first` points what all pictures must share: exposure, range of
-    /// the colour map and first radius of the kd-tree.
-    pub(super) fn settle(
-        &mut self,
-        job: &mut Job,
-        renderer: &mut Renderer,
-        all: &PointCloud,
-        first: Arc<PointCloud>,
-    ) -> Result<Camera, Failure> {
-        job.check_color(all)?;
-        job.settle_exposure(&first);
-        let (camera, axes) = job.camera.place(all, job.inputs.only_scene(), job.size)?;
-        self.axes = Some(axes);
-        let first = self.upright(first);
-        job.settle_first_radius(renderer, &first, &camera)?;
-        let plain = matches!(job.settings.shading.color, ColorMode::Plain | ColorMode::Rgb | ColorMode::Normal);
-        if job.settings.shading.range.is_none() && !plain {
-            // No later frame may be averaged with this trial.
-            let averaged = std::mem::replace(&mut job.settings.reconstruction.frames_averaged, 1);
-            let range = job.render(renderer, &first, &camera)?.counts.value_range;
-            job.settings.reconstruction.frames_averaged = averaged;
-            let ends = range.map(|ends| ends.map(|end| end as f32));
-            job.settings.shading.range = ends.filter(|[low, high]| low < high);
-        }
-        Ok(camera)
-    }
-
-    /// The points with the shared up axis.
-    pub(super) fn upright(&self, mut cloud: Arc<PointCloud>) -> Arc<PointCloud> {
-        if let Some(axes) = self.axes
-            && cloud.axes() != Some(axes)
-        {
-            // Other owners of the cloud keep theirs; this is a copy.
-            cloud = Arc::new(Arc::unwrap_or_clone(cloud).with_axes(axes));
-        }
-        cloud
     }
 }

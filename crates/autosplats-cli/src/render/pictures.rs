@@ -3,30 +3,33 @@
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
+use std::time::Instant;
 
-use autosplats::{Counts, Image, Timings};
-use autosplats_film::{Error, Film, Frames, Target};
+use autosplats::{Counts, Frame, Image, Timings};
+use autosplats_output::{Film, Frames, Target, write_png};
 use serde::Serialize;
 
+use super::film::FilmJob;
+use super::job::Job;
+use crate::console::Console;
+use crate::device::Device;
 use crate::exit::{Exit, Failure};
-use crate::interrupt;
-use crate::output::{ReadFiles, print_line, write_file, write_png};
+use crate::output::{ReadFiles, write_file};
 
 /// Most pictures in the queue.
 const MAX_QUEUED_PICTURES: usize = 2;
 
 /// How and where pictures are written.
-#[derive(Debug)]
-pub(super) struct Style {
-    pub(super) target: Target,
-    pub(super) size: [u32; 2],
+struct Style {
+    size: [u32; 2],
     /// Pictures per second of a film.
-    pub(super) rate: f64,
-    pub(super) alpha: bool,
+    rate: f64,
+    alpha: bool,
     /// Whether to print a JSON line per picture.
-    pub(super) json: bool,
+    json: bool,
     /// Input files, which must not be replaced.
-    pub(super) inputs: ReadFiles,
+    inputs: ReadFiles,
+    console: Console,
 }
 
 /// A picture, and the report that is printed once it is written.
@@ -64,18 +67,27 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    pub(super) fn start(style: Style) -> Self {
+    /// Starts the thread. A film has `rate` pictures per second.
+    pub(super) fn start(job: &Job, film: &FilmJob, rate: f64) -> Self {
+        let Job { size, json, console, read_files, .. } = job;
+        let (inputs, console) = (read_files.clone(), console.clone());
+        let style = Style { size: *size, rate, alpha: job.transparent(), json: *json, inputs, console };
+        let target = film.target.clone();
         let (queue, shots) = sync_channel(MAX_QUEUED_PICTURES);
         let (written, spare) = channel();
-        let thread = std::thread::spawn(move || match &style.target {
+        let thread = std::thread::spawn(move || match &target {
             Target::Frames(names) => write_frames(&style, names, &shots, &written),
             Target::Film(path) => write_film(&style, path, &shots, &written),
         });
         Self { queue, spare, thread }
     }
 
-    /// Copies a picture, into used memory if there is any.
-    pub(super) fn copy(&self, image: &Image) -> Image {
+    /// The picture to write of a rendered frame, in used memory if there is any.
+    pub(super) fn picture(&self, job: &Job, frame: &Frame<'_>) -> Image {
+        let image = frame.image;
+        if job.supersample > 1 {
+            return image.averaged(job.supersample);
+        }
         let mut copy = self.spare.try_recv().unwrap_or_default();
         (copy.width, copy.height) = (image.width, image.height);
         copy.pixels.clear();
@@ -108,9 +120,9 @@ fn write_frames(
     for QueuedPicture { image, report } in shots.iter().flatten() {
         let path = names.file(report.frame);
         style.inputs.check(&path)?;
-        write_file(&path, |writer| write_png(&image, style.alpha, writer))?;
+        write_file(&path, &style.console, |writer| write_png(&image, style.alpha, writer))?;
         if style.json {
-            tell(&report)?;
+            style.console.print_json(&report)?;
         }
         // The renderer may have ended already.
         let _ = written.send(image);
@@ -124,11 +136,14 @@ fn write_film(
     shots: &Receiver<Option<QueuedPicture>>,
     written: &Sender<Image>,
 ) -> Result<(), Failure> {
+    let interrupt = style.console.interrupt();
+    let failure =
+        |error| if interrupt.requested() { Failure::interrupted() } else { Failure::new(Exit::Output, error) };
     let mut reports = Vec::new();
     {
         // The lock makes Ctrl-C wait until the partial film is removed.
-        let _writing = interrupt::writing();
-        let mut film = Film::begin(path, style.size, style.rate).map_err(film_failure)?;
+        let _writing = interrupt.writing();
+        let mut film = Film::begin(path, style.size, style.rate).map_err(failure)?;
         let mut complete = false;
         for shot in shots {
             let Some(QueuedPicture { image, report }) = shot else {
@@ -136,31 +151,67 @@ fn write_film(
                 break;
             };
             for _ in 0..report.pictures.unwrap_or(1) {
-                film.add(&image).map_err(film_failure)?;
+                film.add(&image).map_err(failure)?;
             }
             if style.json {
                 reports.push(report);
             }
             let _ = written.send(image);
         }
-        if interrupt::requested() {
+        if interrupt.requested() {
             return Err(Failure::interrupted());
         }
         if !complete {
             // The sender reports why pictures are missing.
             return Ok(());
         }
-        film.finish().map_err(film_failure)?;
+        film.finish().map_err(failure)?;
     }
     // The film exists only now, so its frames are reported only now.
-    reports.iter().try_for_each(tell)
+    reports.iter().try_for_each(|report| style.console.print_json(report))
 }
 
-fn tell(report: &FrameReport) -> Result<(), Failure> {
-    let line = serde_json::to_string(report);
-    print_line(&line.map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))?)
+/// Counts of rendered and skipped frames.
+#[derive(Default)]
+pub(super) struct FrameTally {
+    pub(super) written: usize,
+    pub(super) kept: usize,
+    milliseconds: f64,
+    /// Number of frames that show nothing, and the first of them.
+    empty: Option<(usize, usize)>,
 }
 
-fn film_failure(error: Error) -> Failure {
-    if interrupt::requested() { Failure::interrupted() } else { Failure::new(Exit::Output, error) }
+impl FrameTally {
+    /// Counts a rendered frame.
+    pub(super) fn count(&mut self, frame: usize, rendered: &Frame<'_>) {
+        self.milliseconds += rendered.timings.frame;
+        if rendered.counts.covered == 0 {
+            let (count, first) = self.empty.unwrap_or((0, frame));
+            self.empty = Some((count + 1, first));
+        }
+    }
+
+    /// Tells the summary.
+    pub(super) fn summarize(&self, film: &FilmJob, more: &str, begun: Instant, device: &Device, console: &Console) {
+        let place = match &film.target {
+            Target::Film(path) => path.clone(),
+            Target::Frames(names) => names.pattern(),
+        };
+        match self.empty {
+            Some((1, frame)) => console.note(format_args!("frame {frame} shows nothing")),
+            Some((count, first)) => {
+                console.note(format_args!("{count} frames show nothing, the first is frame {first}"));
+            }
+            None => {}
+        }
+        console.tell(format_args!(
+            "{}: {} picture{}{more}; {:.1} s, of which {:.1} s rendering on {}",
+            place.display(),
+            self.written,
+            if self.written == 1 { "" } else { "s" },
+            begun.elapsed().as_secs_f64(),
+            self.milliseconds * 1e-3,
+            device.describe()
+        ));
+    }
 }

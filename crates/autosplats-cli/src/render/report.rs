@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use super::job::Job;
 use crate::device::Device;
-use crate::exit::{Exit, Failure};
 
 /// The object that `--json` prints.
 #[derive(Debug, Serialize)]
@@ -70,22 +69,16 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// The report as one line of JSON.
-    pub(super) fn to_json(&self) -> Result<String, Failure> {
-        // Only a path that is not UTF-8 can fail here.
-        serde_json::to_string(self).map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))
-    }
-
-    /// Prints the summary on standard error.
-    pub(super) fn summarize(&self) {
+    /// The summary for people.
+    pub(super) fn summary(&self) -> String {
         let names: Vec<_> = self.outputs.iter().map(|written| written.path.display().to_string()).collect();
         let PrintedTimings { read, stages, write } = &self.timings_ms;
-        eprintln!(
+        format!(
             "{}: {} points, {} visible; read {read:.0} ms, frame {:.0} ms, write {write:.0} ms",
             names.join(", "),
             self.counts.points,
             self.counts.visible,
             stages.frame
-        );
+        )
     }
 }

@@ -8,6 +8,7 @@ mod common;
 mod convert;
 mod doctor;
 mod frames;
+mod in_process;
 mod info;
 #[cfg(feature = "zenoh")]
 mod live_pictures;

@@ -46,9 +46,6 @@ struct StoredReadOptions {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct StoredPlayOptions {
-    /// Whether the input is played though its source may be static.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    played: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     fps: Option<f64>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -56,7 +53,7 @@ struct StoredPlayOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     fixed_frame: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    strew: Option<usize>,
+    sample: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     scan: Option<usize>,
     #[serde(skip_serializing_if = "is_zero")]
@@ -99,7 +96,7 @@ impl StoredInput {
 
     /// Whether the input moves, or may move.
     pub(crate) fn moves(&self) -> bool {
-        self.play.played || Input::parse(&self.source).is_ok_and(|input| input.moves())
+        self.clone().open(Path::new("")).is_ok_and(|(input, _)| input.moves())
     }
 
     /// Why the stored values are invalid; `None` if they are valid.
@@ -120,8 +117,8 @@ impl StoredInput {
         } else {
             folder.join(source).display().to_string()
         })?;
-        let (played, play) = (play.played, play.options());
-        let input = Input { world_from_input: pose, options: options.options(), played, play, ..input };
+        let (options, play) = (options.options(), play.options());
+        let input = Input { world_from_input: pose, options, play, ..input };
         Ok((input, Appearance { visible, tint }))
     }
 }
@@ -147,11 +144,10 @@ impl StoredPlayOptions {
     fn of(input: &Input) -> Self {
         let PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest, all: _ } = input.play.clone();
         Self {
-            played: input.played,
             fps,
             topics,
             fixed_frame: frame,
-            strew: sample,
+            sample,
             scan: scanners,
             seed,
             watch,
@@ -166,10 +162,10 @@ impl StoredPlayOptions {
     }
 
     fn options(self) -> PlayOptions {
-        let Self { played: _, fps, topics, fixed_frame, strew, scan, seed, watch, decay, accumulate } = self;
+        let Self { fps, topics, fixed_frame, sample, scan, seed, watch, decay, accumulate } = self;
         let decay = decay.and_then(|decay| Duration::try_from_secs_f64(decay).ok());
         let latest = LatestOptions { decay, accumulate, ..LatestOptions::default() };
-        let (frame, sample, scanners) = (fixed_frame, strew, scan);
+        let (frame, scanners) = (fixed_frame, scan);
         PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest, all: false }
     }
 }
@@ -205,7 +201,7 @@ mod tests {
             latest,
         };
         let world_from_input = DMat4::from_rotation_z(0.5);
-        Input { options, play, played: true, world_from_input, ..Input::file("/a/drive.mcap".into()) }
+        Input { options, play, world_from_input, ..Input::file("/a/drive.mcap".into()) }
     }
 
     #[test]
@@ -217,8 +213,8 @@ mod tests {
         assert_eq!(read, kept, "as it was: {text}");
         assert_eq!(read.problem(), None, "nothing is wrong with it");
         let (input, seen) = read.open(Path::new("/elsewhere")).expect("it can be opened");
-        let Input { options, play, played, world_from_input, .. } = told();
-        assert_eq!((seen, input.played, input.world_from_input), (appearance, played, world_from_input));
+        let Input { options, play, world_from_input, .. } = told();
+        assert_eq!((seen, input.world_from_input), (appearance, world_from_input));
         assert_eq!(input.play, play, "played as it was");
         assert_eq!(
             (input.options.columns, input.options.depth_camera, input.options.keep_no_returns),

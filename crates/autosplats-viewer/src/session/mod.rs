@@ -1,9 +1,9 @@
 //! The session: what is open, and how it is edited, read and played. It knows no camera and draws nothing.
 
+mod appearance;
 pub(crate) mod document;
 mod editing;
 mod glance;
-mod input;
 mod kept;
 mod loading;
 pub(crate) mod measure;
@@ -15,16 +15,16 @@ use std::path::PathBuf;
 
 use autosplats::cloud::Axes;
 use autosplats::cloud::glam::DVec3;
+pub(crate) use autosplats_sources::Input;
 use eframe::egui;
 
+pub(crate) use self::appearance::Appearance;
 pub(crate) use self::document::{
     ClipBox, Counts, Document, ExportError, ExportScope, Exported, Grip, History, Layer, LayerId, PickedPoint, Region,
     Replace, SelectMode, ShownCloud,
 };
 pub(crate) use self::editing::CachedCounts;
 pub(crate) use self::glance::{FOV_DEG, FirstLook, SharedViewFrame, ViewFrame};
-pub(crate) use self::input::Appearance;
-pub use self::input::Input;
 pub(crate) use self::kept::StoredInput;
 pub(crate) use self::loading::{JobId, JobNews, Loader, Watch};
 pub(crate) use self::measure::Ruler;

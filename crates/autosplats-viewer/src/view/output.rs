@@ -27,7 +27,7 @@ impl View {
     pub(crate) fn save_picture(&self, picture: Image, path: PathBuf) {
         let messages = self.messages.clone();
         spawn("picture", move || {
-            let written = files::write(&path, |writer| files::encode_png(&picture, writer));
+            let written = files::write(&path, |writer| autosplats_output::write_png(&picture, true, writer));
             messages.result(match written {
                 Ok(()) => Ok(format!("{} was written", path.display())),
                 Err(error) => Err(format!("{}: {error}", path.display())),

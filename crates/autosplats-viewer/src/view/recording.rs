@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use autosplats::{Camera, Image};
-use autosplats_film::{Film, Frames, Target};
+use autosplats_output::{Film, Frames, Target, write_png};
 use eframe::egui;
 
 use crate::files;
@@ -147,7 +147,7 @@ fn write_frames(
     let mut count = 0;
     for image in queue {
         let path = frames.file(count);
-        files::write(&path, |writer| files::encode_png(&image, writer))
+        files::write(&path, |writer| write_png(&image, true, writer))
             .map_err(|error| format!("{}: {error}", path.display()))?;
         count += 1;
         context.request_repaint();

@@ -1,10 +1,60 @@
 //! The side that each normal points to.
 
-use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DVec3, Vec3};
+use autosplats_cloud::{Axes, PointCloud, Scan};
 
 use super::{MAX_COORDINATE, Orientation, Viewpoint};
 use crate::Error;
+
+/// Height over the shorter side below which a cloud is terrain.
+const TERRAIN_HEIGHT: f32 = 0.5;
+
+impl Orientation {
+    /// The side for a cloud about which nothing else is known: [towards its sensors](Self::towards_sensors), else up
+    /// along z for terrain, much wider than high, else outward.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats::{Orientation, cloud::{PointCloud, glam::DVec3}};
+    ///
+    /// let floor = (0..100).map(|i| [(i % 10) as f32, (i / 10) as f32, 0.0]).collect();
+    /// let cloud = PointCloud::new(DVec3::ZERO, floor);
+    /// assert_eq!(Orientation::usual(&cloud), Orientation::Direction(DVec3::Z));
+    /// ```
+    #[must_use]
+    pub fn usual(cloud: &PointCloud) -> Self {
+        Self::towards_sensors(cloud)
+            .unwrap_or_else(|| if is_terrain(cloud) { Self::Direction(DVec3::Z) } else { Self::Outward })
+    }
+
+    /// Towards the sensors of the cloud's scans, or the origin for points in a camera's frame. `None` if the cloud
+    /// states no sensor.
+    #[must_use]
+    pub fn towards_sensors(cloud: &PointCloud) -> Option<Self> {
+        if cloud.scans().is_empty() {
+            return (cloud.axes() == Some(Axes::Camera)).then(|| Self::towards(DVec3::ZERO, cloud));
+        }
+        let viewpoint = |scan: &Scan| Viewpoint { position: scan.position(), points: scan.points.clone() };
+        Some(Self::Viewpoints(cloud.scans().iter().map(viewpoint).collect()))
+    }
+
+    /// Towards one position in world coordinates, that of the sensor which saw all points of the cloud.
+    #[must_use]
+    pub fn towards(position: DVec3, cloud: &PointCloud) -> Self {
+        Self::Viewpoints(vec![Viewpoint { position, points: 0..cloud.len() }])
+    }
+}
+
+/// Whether the points are terrain seen from above: much wider than high.
+fn is_terrain(cloud: &PointCloud) -> bool {
+    let finite = cloud.positions().iter().filter(|point| point.iter().all(|value| value.is_finite()));
+    let (min, max) = finite.fold(([f32::MAX; 3], [f32::MIN; 3]), |(min, max), point| {
+        (std::array::from_fn(|axis| min[axis].min(point[axis])), std::array::from_fn(|axis| max[axis].max(point[axis])))
+    });
+    let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| max[axis] - min[axis]);
+    cloud.axes() != Some(Axes::YUp) && z < TERRAIN_HEIGHT * x.min(y)
+}
 
 /// Resolved orientation of normals.
 pub(super) enum Sides {

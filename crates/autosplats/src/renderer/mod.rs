@@ -9,6 +9,7 @@ mod gpu;
 mod layers;
 mod rules;
 mod settings;
+mod settle;
 mod still;
 mod surfels;
 mod upward;

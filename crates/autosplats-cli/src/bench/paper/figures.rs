@@ -5,13 +5,14 @@ use std::path::Path;
 use autosplats::{Camera, ColorMode, Image, NormalSettings, Projection, Renderer, Settings, estimate_normals};
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DVec3, Vec3};
+use autosplats_output::write_png;
 use serde::{Deserialize, Serialize};
 
 use super::measure::{K, LoadedScene};
 use super::scenes::generated;
+use crate::console::Console;
 use crate::exit::Failure;
-use crate::output::{write_file, write_png};
-use crate::render::render_failure;
+use crate::output::write_file;
 
 /// Gap between pictures side by side, in pixels.
 const GAP_PX: u32 = 8;
@@ -40,36 +41,37 @@ pub(super) struct Radii {
 }
 
 /// Renders the scene as measured, at half the size.
-pub(super) fn picture(loaded: &LoadedScene<'_>, path: &Path) -> Result<(), Failure> {
+pub(super) fn picture(loaded: &LoadedScene<'_>, path: &Path, console: &Console) -> Result<(), Failure> {
     let LoadedScene { scene, cloud, camera } = loaded;
     let size = scene.size.map(|side| side / 2);
     let mut renderer = Renderer::new();
-    let frame = renderer.render(cloud, camera, size, &Settings::default()).map_err(render_failure)?;
-    write_file(path, |writer| write_png(frame.image, false, writer)).map(|_| ())
+    let frame = renderer.render(cloud, camera, size, &Settings::default())?;
+    write_file(path, console, |writer| write_png(frame.image, false, writer)).map(|_| ())
 }
 
 /// Figure 6: normals on the fly beside precomputed ones, by the same estimator.
-pub(super) fn normals(loaded: &LoadedScene<'_>, side: u32, path: &Path) -> Result<NormalError, Failure> {
+pub(super) fn normals(
+    loaded: &LoadedScene<'_>,
+    side: u32,
+    path: &Path,
+    console: &Console,
+) -> Result<NormalError, Failure> {
     let LoadedScene { cloud, camera, .. } = loaded;
     let size = [side, side];
     let settings = Settings::default();
     let mut renderer = Renderer::new();
     let normal_settings = NormalSettings { k: K, ..NormalSettings::default() };
-    let beforehand = estimate_normals(cloud, &normal_settings, &()).map_err(render_failure)?;
-    let on_the_fly = renderer.render(cloud, camera, size, &settings).map_err(render_failure)?.image.clone();
-    let surfels = renderer.surfels().map_err(render_failure)?;
+    let beforehand = estimate_normals(cloud, &normal_settings, &())?;
+    let on_the_fly = renderer.render(cloud, camera, size, &settings)?.image.clone();
+    let surfels = renderer.surfels()?;
     let angle = |surfel: &autosplats::PointSurfel| {
         let known = Vec3::from(beforehand.normals[surfel.point as usize]);
         f64::from(known.dot(surfel.normal.into()).abs().min(1.0).acos().to_degrees())
     };
     let mut angles: Vec<f64> = surfels.iter().filter(|surfel| surfel.radius > 0.0).map(angle).collect();
     angles.sort_unstable_by(f64::total_cmp);
-    let given = renderer
-        .render_with_normals(cloud, &beforehand, camera, size, &settings)
-        .map_err(render_failure)?
-        .image
-        .clone();
-    write_side_by_side(&[&on_the_fly, &given], path)?;
+    let given = renderer.render_with_normals(cloud, &beforehand, camera, size, &settings)?.image.clone();
+    write_side_by_side(&[&on_the_fly, &given], path, console)?;
     let count = angles.len().max(1) as f64;
     let mean = |value: &dyn Fn(f64) -> f64| angles.iter().map(|&angle| value(angle)).sum::<f64>() / count;
     Ok(NormalError {
@@ -85,8 +87,8 @@ pub(super) fn normals(loaded: &LoadedScene<'_>, side: u32, path: &Path) -> Resul
 
 /// Figure 7: a small body on the head of a large one. Shows the surface, the k-radius in colours and single splats, the
 /// latter also near the small body.
-pub(super) fn scales(count: usize, side: u32, quiet: bool, path: &Path) -> Result<Radii, Failure> {
-    let (cloud, camera) = generated(&format!("two-scales:{count}"), quiet)?;
+pub(super) fn scales(count: usize, side: u32, path: &Path, console: &Console) -> Result<Radii, Failure> {
+    let (cloud, camera) = generated(&format!("two-scales:{count}"), console)?;
     let up = camera.up.normalize();
     let height = |position: &[f32; 3]| (Vec3::from(*position).as_dvec3() + cloud.origin()).dot(up);
     let mut heights: Vec<f64> = cloud.positions().iter().map(height).collect();
@@ -108,10 +110,10 @@ pub(super) fn scales(count: usize, side: u32, quiet: bool, path: &Path) -> Resul
     let mut images = Vec::new();
     let mut medians = [0.0; 2];
     for (camera, settings) in [(&camera, &plain), (&camera, &colored), (&camera, &apart), (&near, &apart)] {
-        let frame = renderer.render(&cloud, camera, [side, side], settings).map_err(render_failure)?;
+        let frame = renderer.render(&cloud, camera, [side, side], settings)?;
         images.push(frame.image.clone());
         let wants_small = std::ptr::eq(camera, &near);
-        let surfels = renderer.surfels().map_err(render_failure)?;
+        let surfels = renderer.surfels()?;
         let of_body = surfels
             .iter()
             .filter(|surfel| surfel.radius > 0.0)
@@ -120,12 +122,12 @@ pub(super) fn scales(count: usize, side: u32, quiet: bool, path: &Path) -> Resul
         radii.sort_unstable_by(f32::total_cmp);
         medians[usize::from(wants_small)] = radii.get(radii.len() / 2).copied().unwrap_or_default().into();
     }
-    write_side_by_side(&images.iter().collect::<Vec<_>>(), path)?;
+    write_side_by_side(&images.iter().collect::<Vec<_>>(), path, console)?;
     Ok(Radii { large: medians[0], small: medians[1] })
 }
 
 /// Figure 9: a scan, a closer view, and the curvature there.
-pub(super) fn curvature(loaded: &LoadedScene<'_>, side: u32, path: &Path) -> Result<(), Failure> {
+pub(super) fn curvature(loaded: &LoadedScene<'_>, side: u32, path: &Path, console: &Console) -> Result<(), Failure> {
     let LoadedScene { cloud, camera, .. } = loaded;
     let near = closer(cloud, camera);
     let mut colored = Settings::default();
@@ -133,10 +135,10 @@ pub(super) fn curvature(loaded: &LoadedScene<'_>, side: u32, path: &Path) -> Res
     let mut renderer = Renderer::new();
     let mut images = Vec::new();
     for (camera, settings) in [(camera, &Settings::default()), (&near, &Settings::default()), (&near, &colored)] {
-        let frame = renderer.render(cloud, camera, [side, side * 3 / 2], settings).map_err(render_failure)?;
+        let frame = renderer.render(cloud, camera, [side, side * 3 / 2], settings)?;
         images.push(frame.image.clone());
     }
-    write_side_by_side(&images.iter().collect::<Vec<_>>(), path)
+    write_side_by_side(&images.iter().collect::<Vec<_>>(), path, console)
 }
 
 /// The same camera aimed at the upper part of the cloud, magnified three times.
@@ -159,7 +161,7 @@ fn zoomed(camera: &Camera, look_at: DVec3, times: f64) -> Camera {
 }
 
 /// Writes pictures of equal height side by side, with white gaps.
-fn write_side_by_side(images: &[&Image], path: &Path) -> Result<(), Failure> {
+fn write_side_by_side(images: &[&Image], path: &Path, console: &Console) -> Result<(), Failure> {
     let height = images.iter().map(|image| image.height).max().unwrap_or(1);
     let width = images.iter().map(|image| image.width + GAP_PX).sum::<u32>() - GAP_PX;
     let mut pixels = vec![[255; 4]; (width * height) as usize];
@@ -172,7 +174,7 @@ fn write_side_by_side(images: &[&Image], path: &Path) -> Result<(), Failure> {
         left += image.width + GAP_PX;
     }
     let joined = Image { width, height, pixels, ..Image::default() };
-    write_file(path, |writer| write_png(&joined, false, writer)).map(|_| ())
+    write_file(path, console, |writer| write_png(&joined, false, writer)).map(|_| ())
 }
 
 /// Peak signal-to-noise ratio in decibels; `None` for equal pictures.
@@ -198,7 +200,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("joined.png");
         let image = |value| Image { width: 3, height: 2, pixels: vec![[value; 4]; 6], ..Image::default() };
-        write_side_by_side(&[&image(1), &image(2)], &path)?;
+        write_side_by_side(&[&image(1), &image(2)], &path, &Console::of_process())?;
         let joined = image::open(&path).expect("a picture").to_rgb8();
         assert_eq!(joined.dimensions(), (6 + GAP_PX, 2));
         assert_eq!(

@@ -9,19 +9,20 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
+use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::output::write_file;
 
 /// Measurements by key, in a JSON file.
-#[derive(Debug)]
 pub(super) struct Journal {
+    console: Console,
     path: PathBuf,
     entries: BTreeMap<String, Value>,
 }
 
 impl Journal {
     /// Opens the journal at `path`, or creates one. `fresh` discards existing entries.
-    pub(super) fn open(path: &Path, fresh: bool) -> Result<Self, Failure> {
+    pub(super) fn open(path: &Path, fresh: bool, console: &Console) -> Result<Self, Failure> {
         let bad = |why: String| {
             Failure::new(
                 Exit::Input,
@@ -34,7 +35,7 @@ impl Journal {
             Err(error) if error.kind() == ErrorKind::NotFound => BTreeMap::new(),
             Err(error) => return Err(bad(error.to_string())),
         };
-        Ok(Self { path: path.into(), entries })
+        Ok(Self { console: console.clone(), path: path.into(), entries })
     }
 
     /// The entry of `key`, if it has the type `T`.
@@ -47,7 +48,7 @@ impl Journal {
         let fail = |error: serde_json::Error| Failure::new(Exit::Output, format!("{key}: {error}"));
         self.entries.insert(key.into(), serde_json::to_value(measured).map_err(fail)?);
         let text = serde_json::to_string_pretty(&self.entries).map_err(fail)?;
-        write_file(&self.path, |writer| writer.write_all(text.as_bytes())).map(|_| ())
+        write_file(&self.path, &self.console, |writer| writer.write_all(text.as_bytes())).map(|_| ())
     }
 }
 
@@ -59,14 +60,15 @@ mod tests {
     fn what_was_noted_is_there_the_next_time() -> Result<(), Failure> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("journal.json");
-        let mut journal = Journal::open(&path, false)?;
+        let console = Console::of_process();
+        let mut journal = Journal::open(&path, false, &console)?;
         assert_eq!(journal.get::<Vec<f64>>("a"), None, "nothing was measured yet");
         journal.note("a", &[1.5, 2.0])?;
         journal.note("b", &"text")?;
-        let journal = Journal::open(&path, false)?;
+        let journal = Journal::open(&path, false, &console)?;
         assert_eq!(journal.get::<Vec<f64>>("a"), Some(vec![1.5, 2.0]));
         assert_eq!(journal.get::<Vec<f64>>("b"), None, "a text is no list");
-        assert_eq!(Journal::open(&path, true)?.get::<Vec<f64>>("a"), None, "a fresh one is empty");
+        assert_eq!(Journal::open(&path, true, &console)?.get::<Vec<f64>>("a"), None, "a fresh one is empty");
         Ok(())
     }
 
@@ -75,7 +77,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("journal.json");
         std::fs::write(&path, "{\"a\": ").expect("written");
-        let failure = Journal::open(&path, false).expect_err("it is cut off");
+        let failure = Journal::open(&path, false, &Console::of_process()).err().expect("it is cut off");
         assert!(failure.message.contains("--fresh"), "{}", failure.message);
     }
 }

@@ -4,14 +4,14 @@ use autosplats::{
     Backend, Camera, Counts, Error, Image, NormalSettings, PassTime, RadiusTrial, Reconstruction, Renderer,
     SearchEngine, Settings, Timings, best_first_radius, estimate_normals,
 };
-use autosplats_cloud::PointCloud;
+use autosplats_cloud::{ErrorKind, PointCloud};
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use serde::{Deserialize, Serialize};
 
 use super::scenes::PaperScene;
 use crate::bench::{TREE_BUILD_PREFIX, median};
 use crate::device::Device;
 use crate::exit::Failure;
-use crate::render::render_failure;
 
 /// The k of Table 1.
 pub(super) const K: u32 = 10;
@@ -177,10 +177,8 @@ pub(super) fn settings(method: Method, first_radius: f32, k: u32, culled: bool) 
 fn outcome<T>(result: Result<T, Error>) -> Result<Outcome<T>, Failure> {
     match result {
         Ok(value) => Ok(Ok(value)),
-        Err(error @ (Error::Device(_) | Error::DeviceLimit { .. } | Error::DeviceMemory(_) | Error::DeviceLost(_))) => {
-            Ok(Err(error.to_string()))
-        }
-        Err(error) => Err(render_failure(error)),
+        Err(error) if [ErrorKind::Device, ErrorKind::Memory].contains(&error.kind()) => Ok(Err(error.to_string())),
+        Err(error) => Err(error.into()),
     }
 }
 
@@ -219,7 +217,7 @@ pub(super) fn time(
             break;
         }
     }
-    let convergence = renderer.convergence().map_err(render_failure)?;
+    let convergence = renderer.convergence()?;
     let of = |value: &dyn Fn(&(Timings, f64)) -> f64| median(samples.iter().map(value));
     Ok(Ok(Timing {
         points: counts.points,
@@ -271,9 +269,8 @@ impl ExactRadii {
     pub(super) fn new(renderers: &mut Renderers, loaded: &LoadedScene<'_>) -> Result<Self, Failure> {
         let LoadedScene { scene, cloud, camera } = loaded;
         let settings = settings(Method::GridCpu, f32::NAN, K, false);
-        renderers.cpu.render(cloud, camera, scene.size, &settings).map_err(render_failure)?;
-        let mut visible: Vec<u32> =
-            renderers.cpu.surfels().map_err(render_failure)?.iter().map(|surfel| surfel.point).collect();
+        renderers.cpu.render(cloud, camera, scene.size, &settings)?;
+        let mut visible: Vec<u32> = renderers.cpu.surfels()?.iter().map(|surfel| surfel.point).collect();
         visible.sort_unstable();
         let positions = visible.iter().map(|&point| cloud.positions()[point as usize]).collect();
         let seen = PointCloud::new(cloud.origin(), positions);
@@ -284,7 +281,7 @@ impl ExactRadii {
 /// Distance of each point to its k-th neighbour.
 fn exact_radii(cloud: &PointCloud) -> Result<Vec<f32>, Failure> {
     let settings = NormalSettings { k: K, ..NormalSettings::default() };
-    let normals = estimate_normals(cloud, &settings, &()).map_err(render_failure)?;
+    let normals = estimate_normals(cloud, &settings, &())?;
     // The density radius is 2·√(r²/k).
     Ok(normals.radius.into_iter().map(|radius| 0.5 * radius * (K as f32).sqrt()).collect())
 }
@@ -312,8 +309,8 @@ pub(super) fn accuracy(
         Ok(frame) => frame.counts,
         Err(why) => return Ok(Err(why)),
     };
-    let left = renderer.convergence().map_err(render_failure)?;
-    let surfels = renderer.surfels().map_err(render_failure)?;
+    let left = renderer.convergence()?;
+    let surfels = renderer.surfels()?;
     let same = |found: f32, exact: f32| (found - exact).abs() <= MAX_RADIUS_DIFFERENCE * exact;
     let [mut on_screen, mut in_space] = [0; 2];
     for surfel in &surfels {
@@ -341,7 +338,6 @@ pub(super) fn kiddo(loaded: &LoadedScene<'_>, exact: &ExactRadii) -> KiddoTimes 
 }
 
 fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
-    use kiddo::{ImmutableKdTree, SquaredEuclidean};
     let start = std::time::Instant::now();
     let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(points) else { return f64::NAN };
     // kiddo also finds the point itself.
@@ -358,7 +354,7 @@ pub(super) fn culling_difference(renderers: &mut Renderers, loaded: &LoadedScene
     let mut images: Vec<Image> = Vec::new();
     for culled in [false, true] {
         let settings = settings(Method::GridCpu, f32::NAN, K, culled);
-        let frame = renderers.cpu.render(cloud, camera, scene.size, &settings).map_err(render_failure)?;
+        let frame = renderers.cpu.render(cloud, camera, scene.size, &settings)?;
         images.push(frame.image.clone());
     }
     let differs = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > MAX_LEVEL_DIFFERENCE);

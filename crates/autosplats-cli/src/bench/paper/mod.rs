@@ -12,7 +12,7 @@ mod numbers;
 mod report;
 mod scenes;
 
-use std::fs::create_dir_all;
+use std::io::Write as _;
 use std::path::Path;
 
 use autosplats_cloud::Progress as _;
@@ -25,11 +25,11 @@ use self::measure::{
 };
 use self::report::Report;
 use self::scenes::{NAMES, PaperScene};
-use crate::bench::args::PaperArgs;
+use crate::args::PaperArgs;
+use crate::console::Console;
 use crate::exit::{Exit, Failure, suggest};
-use crate::output::{ReadFiles, check_target, print_line, write_file};
+use crate::output::{ReadFiles, check_target, create_folder, write_file};
 use crate::progress::Bar;
-use crate::threads::start_threads;
 
 /// Values of k in Figure 10.
 const KS: [u32; 10] = [5, 10, 15, 20, 25, 30, 35, 40, 45, 50];
@@ -120,7 +120,7 @@ impl Task {
         match self {
             Self::Picture => journal.get(key) == Some(true) && there(&picture_name(scene)),
             Self::Table(..) | Self::Stages(..) => measured::<Timing>(journal, key),
-            Self::Kiddo => measured::<KiddoTimes>(journal, key),
+            Self::Kiddo => journal.get::<KiddoTimes>(key).is_some(),
             Self::FirstRadius => measured::<FirstRadius>(journal, key),
             Self::Accuracy(_) => measured::<Accuracy>(journal, key),
             Self::Culling => journal.get::<f64>(key).is_some(),
@@ -151,22 +151,19 @@ fn tasks(scene: &PaperScene, ks: &[u32], few_ks: &[u32]) -> Vec<Task> {
 }
 
 /// Runs the measurements that the journal lacks, and writes the page.
-pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
-    let PaperArgs { scenes, bunny, gallop, out, quick, fresh, run } = args;
-    start_threads(run)?;
+pub(crate) fn run(args: &PaperArgs, console: &Console) -> Result<(), Failure> {
+    let PaperArgs { scenes, bunny, gallop, out, quick, fresh, run: _ } = args;
     let quick_index = usize::from(*quick);
     let scenes = scenes.iter().map(|name| scene(name, bunny.as_deref(), gallop.as_deref(), *quick));
     let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
     // A quick run has files of its own, so that the results of a full run stay.
     let suffix = if *quick { "-quick" } else { "" };
     let pictures = out.join(format!("results{suffix}"));
-    create_dir_all(&pictures).map_err(|error| {
-        Failure::new(Exit::Output, format!("{}: cannot create the folder: {error}", pictures.display()))
-    })?;
+    create_folder(&pictures)?;
     let page = out.join(format!("RESULTS{suffix}.md"));
-    check_target(&page, &ReadFiles::default())?;
+    check_target(&page, &ReadFiles::default(), console)?;
 
-    let mut journal = Journal::open(&pictures.join("measurements.json"), *fresh)?;
+    let mut journal = Journal::open(&pictures.join("measurements.json"), *fresh, console)?;
     let mut renderers = Renderers::new();
     let ks: &[u32] = if *quick { &QUICK_KS } else { &KS };
     let few_ks: &[u32] = if !*quick && renderers.is_software() { &FEW_KS } else { ks };
@@ -185,11 +182,11 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
         if tasks.is_empty() {
             continue;
         }
-        let (cloud, camera) = scene.load(run.quiet)?;
+        let (cloud, camera) = scene.load(console)?;
         let loaded = LoadedScene { scene, cloud, camera };
         let mut exact = None;
         for task in tasks {
-            let bar = Bar::new(&format!("{}: {}", scene.name, task.describe()), run.quiet);
+            let bar = Bar::new(&format!("{}: {}", scene.name, task.describe()), console);
             bar.report((all - left) as f32 / all as f32);
             let key = task.key(scene, &renderers);
             let radius: Outcome<FirstRadius> = journal
@@ -211,7 +208,7 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
                     journal.note(&key, &measure::first_radius(&mut renderers, &loaded)?)?;
                 }
                 Task::Picture => {
-                    figures::picture(&loaded, &pictures.join(picture_name(scene)))?;
+                    figures::picture(&loaded, &pictures.join(picture_name(scene)), console)?;
                     journal.note(&key, &true)?;
                 }
                 Task::Table(method, culled) => {
@@ -234,10 +231,10 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
                 }
                 Task::Culling => journal.note(&key, &culling_difference(&mut renderers, &loaded)?)?,
                 Task::Normals => {
-                    journal.note(&key, &figures::normals(&loaded, side, &pictures.join(FIGURE_6))?)?;
+                    journal.note(&key, &figures::normals(&loaded, side, &pictures.join(FIGURE_6), console)?)?;
                 }
                 Task::Curvature => {
-                    figures::curvature(&loaded, side / 3 * 2, &pictures.join(FIGURE_9))?;
+                    figures::curvature(&loaded, side / 3 * 2, &pictures.join(FIGURE_9), console)?;
                     journal.note(&key, &true)?;
                 }
             }
@@ -245,7 +242,7 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
         }
     }
     if journal.get::<Radii>(&scales).is_none() || !pictures.join(FIGURE_7).is_file() {
-        let radii = figures::scales(TWO_SCALES[quick_index], side / 3 * 2, run.quiet, &pictures.join(FIGURE_7))?;
+        let radii = figures::scales(TWO_SCALES[quick_index], side / 3 * 2, &pictures.join(FIGURE_7), console)?;
         journal.note(&scales, &radii)?;
     }
 
@@ -258,9 +255,9 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
         folder: &format!("results{suffix}"),
         quick: *quick,
     };
-    report.write_charts(&pictures)?;
-    write_file(&page, |writer| std::io::Write::write_all(writer, report.page().as_bytes()))?;
-    print_line(&page.display().to_string())
+    report.write_charts(&pictures, console)?;
+    write_file(&page, console, |writer| writer.write_all(report.page().as_bytes()))?;
+    console.print_line(page.display())
 }
 
 /// File name of a scene's picture.

@@ -1,6 +1,7 @@
 //! The page: tables, charts and text, from the journal alone.
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::Path;
 
 use super::chart::{Labels, Line, log_lines, stacked_bars};
@@ -10,6 +11,7 @@ use super::measure::{Accuracy, FirstRadius, K, KiddoTimes, Method, Outcome, Rend
 use super::numbers::{percent, speedups};
 use super::scenes::PaperScene;
 use super::{FIGURE_6, FIGURE_7, FIGURE_9, FRAMES, Task, picture_name, tasks};
+use crate::console::Console;
 use crate::exit::Failure;
 use crate::output::write_file;
 
@@ -17,7 +19,6 @@ use crate::output::write_file;
 const CONVERGENCE: &str = "figure-11.svg";
 
 /// Input of the page.
-#[derive(Debug)]
 pub(super) struct Report<'a> {
     pub(super) journal: &'a Journal,
     pub(super) renderers: &'a Renderers,
@@ -440,13 +441,13 @@ impl Report<'_> {
     }
 
     /// Writes the charts of the page.
-    pub(super) fn write_charts(&self, folder: &Path) -> Result<(), Failure> {
+    pub(super) fn write_charts(&self, folder: &Path, console: &Console) -> Result<(), Failure> {
         let labels =
             Labels { title: "splat communication", x: "iteration", y: "% of the points without a k-radius before it" };
         let lines = self.convergence();
         if !lines.is_empty() {
             let svg = log_lines(labels, &lines);
-            write_file(&folder.join(CONVERGENCE), |writer| std::io::Write::write_all(writer, svg.as_bytes()))?;
+            write_file(&folder.join(CONVERGENCE), console, |writer| writer.write_all(svg.as_bytes()))?;
         }
         for scene in self.scenes {
             for method in Method::BY_STAGE {
@@ -457,8 +458,8 @@ impl Report<'_> {
                 let title = format!("{}, {}", scene.name, method.name());
                 let labels = Labels { title: &title, x: "k", y: "ms" };
                 let svg = stacked_bars(labels, &["project", "search", "fit", "splat", "shade"], &bars);
-                write_file(&folder.join(chart_name(scene, method)), |writer| {
-                    std::io::Write::write_all(writer, svg.as_bytes())
+                write_file(&folder.join(chart_name(scene, method)), console, |writer| {
+                    writer.write_all(svg.as_bytes())
                 })?;
             }
         }

@@ -8,10 +8,11 @@ use autosplats_cloud::{Contents, PointCloud, sample_surface};
 use autosplats_formats::{ReadOptions, read_mesh, read_with};
 use autosplats_scenes::Scene;
 
+use crate::console::Console;
 use crate::exit::{Exit, Failure};
-use crate::input::{Inputs, read_failure};
+use crate::input::Inputs;
 use crate::progress::Bar;
-use crate::render::{render_failure, scene_camera};
+use crate::render::scene_camera;
 
 /// Size of the paper's pictures in pixels.
 const SIZE: [u32; 2] = [1760, 900];
@@ -135,16 +136,16 @@ impl PaperScene {
     }
 
     /// The points, and the camera that shows them.
-    pub(super) fn load(&self, quiet: bool) -> Result<(PointCloud, Camera), Failure> {
+    pub(super) fn load(&self, console: &Console) -> Result<(PointCloud, Camera), Failure> {
         match &self.source {
-            SceneSource::Generated(scene) => generated(&format!("{scene}:{}", self.points), quiet),
+            SceneSource::Generated(scene) => generated(&format!("{scene}:{}", self.points), console),
             SceneSource::File(path) => {
-                let bar = Bar::on_file("reading", path, quiet);
-                let cloud = read_with(path, &ReadOptions::default(), &bar).map_err(read_failure)?;
+                let bar = Bar::on_file("reading", path, console);
+                let cloud = read_with(path, &ReadOptions::default(), &bar)?;
                 self.fitted(cloud, ViewDirection::Front)
             }
             SceneSource::Gallop(folder) => {
-                let (cloud, camera) = self.fitted(herd(folder, self.points, quiet)?, ViewDirection::Iso)?;
+                let (cloud, camera) = self.fitted(herd(folder, self.points, console)?, ViewDirection::Iso)?;
                 // The herd extends beyond the picture, which matches the paper's pixel counts.
                 Ok((cloud, Camera { projection: Projection::PerspectiveFovDeg(HERD_FOV_DEG), ..camera }))
             }
@@ -154,7 +155,7 @@ impl PaperScene {
     fn fitted(&self, cloud: PointCloud, direction: ViewDirection) -> Result<(PointCloud, Camera), Failure> {
         let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
         let projection = Projection::PerspectiveFovDeg(FOV_DEG);
-        let camera = Camera::fit(&cloud, guess_axes(&cloud), direction, aspect, projection).map_err(render_failure)?;
+        let camera = Camera::fit(&cloud, guess_axes(&cloud), direction, aspect, projection)?;
         Ok((cloud, camera))
     }
 }
@@ -164,14 +165,14 @@ fn file_name(path: &Path) -> String {
 }
 
 /// A built-in scene, `NAME[:COUNT]`, and its camera.
-pub(super) fn generated(name: &str, quiet: bool) -> Result<(PointCloud, Camera), Failure> {
+pub(super) fn generated(name: &str, console: &Console) -> Result<(PointCloud, Camera), Failure> {
     let inputs = Inputs::scene(name)?;
     let scene: &Scene = inputs.only_scene().ok_or_else(|| Failure::usage(format!("{name} is not a scene")))?;
-    Ok((inputs.read(quiet)?, scene_camera(scene)))
+    Ok((inputs.read(console)?, scene_camera(scene)))
 }
 
 /// Horses in rows of `HORSES_PER_ROW` at moments of one gallop, with `count` sampled points in all.
-fn herd(folder: &Path, count: usize, quiet: bool) -> Result<PointCloud, Failure> {
+fn herd(folder: &Path, count: usize, console: &Console) -> Result<PointCloud, Failure> {
     let unreadable = |error: std::io::Error| Failure::new(Exit::Input, format!("{}: {error}", folder.display()));
     let mut files = Vec::new();
     for entry in folder.read_dir().map_err(unreadable)? {
@@ -181,19 +182,19 @@ fn herd(folder: &Path, count: usize, quiet: bool) -> Result<PointCloud, Failure>
     if files.is_empty() {
         return Err(Failure::new(Exit::Input, format!("{}: there are no files in it", folder.display())));
     }
-    let bar = Bar::new("resampling the gallop", quiet);
+    let bar = Bar::new("resampling the gallop", console);
     let options = ReadOptions::default();
     // The first file has the triangles of all.
-    let triangles = read_mesh(&files[0], &options, &()).map_err(read_failure)?.triangles;
+    let triangles = read_mesh(&files[0], &options, &())?.triangles;
     let mut horses = Vec::new();
     for horse in 0..HORSE_COUNT {
         autosplats_cloud::Progress::report(&bar, horse as f32 / HORSE_COUNT as f32);
         // Files seven frames apart show neighbours at different moments.
         let file = &files[horse * 7 % files.len()];
-        let cloud = read_with(file, &options, &()).map_err(read_failure)?;
+        let cloud = read_with(file, &options, &())?;
         let mesh = Contents { cloud, triangles: triangles.clone() };
         let share = count / HORSE_COUNT + usize::from(horse < count % HORSE_COUNT);
-        let points = sample_surface(&mesh, share, horse as u64, &()).map_err(read_failure)?;
+        let points = sample_surface(&mesh, share, horse as u64, &())?;
         let [across, along] = [(horse % HORSES_PER_ROW) as f64, (horse / HORSES_PER_ROW) as f64];
         // The horses run along z; rows are staggered.
         let place = DVec3::new(0.95 * across + 0.45 * along, 0.0, -2.1 * along - 0.35 * (2.4 * across).sin());

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use autosplats::{Camera, MAX_SIDE};
-use autosplats_film::{Error, Target, has_ffmpeg};
+use autosplats_output::{Error, Target, has_ffmpeg};
 use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile};

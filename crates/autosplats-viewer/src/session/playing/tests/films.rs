@@ -1,8 +1,8 @@
 //! Films of playing inputs.
 
 use autosplats::{Camera, Image, Projection, Renderer};
-use autosplats_film::Target;
 use autosplats_formats::ReadOptions;
+use autosplats_output::Target;
 
 use super::*;
 use crate::session::Reel;

@@ -2,13 +2,11 @@
 
 use std::path::PathBuf;
 
-use autosplats::Reconstruction;
 use clap::{Args, Subcommand};
 
-use crate::args::RunArgs;
-use crate::choices::{Backend, Engine};
-use crate::first_radius::FirstRadius;
-use crate::values::{self, Neighbors};
+use super::{NeighborArgs, RunArgs};
+use crate::choices::Backend;
+use crate::values;
 
 const BENCH_EXAMPLES: &str = "\
 Examples:
@@ -27,27 +25,11 @@ pub(crate) struct BenchArgs {
     /// Generated scene to render, with its number of points
     #[arg(long, value_name = "NAME[:COUNT]", default_value = "statue:1M")]
     pub(crate) scene: String,
-    /// Algorithm that finds the neighbours
-    #[arg(long, value_enum, default_value = "screen-grid")]
-    pub(crate) engine: Engine,
-    /// First search radius of the engine kd-tree, in the scene's units. 'best' takes the fastest that finds 99.9 % of
-    /// the visible points' neighbourhoods
-    #[arg(long, value_name = "RADIUS|best", default_value = "best", allow_negative_numbers = true)]
-    pub(crate) first_radius: FirstRadius,
+    #[command(flatten)]
+    pub(crate) neighbors: NeighborArgs,
     /// Devices that render, separated by commas; measured one after the other
     #[arg(long = "backend", value_enum, value_delimiter = ',', default_value = "auto")]
     pub(crate) backends: Vec<Backend>,
-    /// Number of neighbours of each point, 1 to 64; 'auto' takes 10, more where points are noisy
-    #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
-    pub(crate) k: Neighbors,
-    /// Number of points that a pixel keeps, 1 or 2
-    #[arg(
-        long,
-        value_name = "COUNT",
-        default_value_t = Reconstruction::default().points_per_pixel,
-        allow_negative_numbers = true
-    )]
-    pub(crate) points_per_pixel: u32,
     /// Do not trim splats at silhouettes; with '-k 10 --points-per-pixel 1' the paper's settings
     #[arg(long)]
     pub(crate) no_trim: bool,

@@ -26,7 +26,7 @@ pub fn has_ffmpeg() -> bool {
 ///
 /// ```no_run
 /// use autosplats::Image;
-/// use autosplats_film::{Film, has_ffmpeg};
+/// use autosplats_output::{Film, has_ffmpeg};
 ///
 /// if has_ffmpeg() {
 ///     let mut film = Film::begin("fade.mp4".as_ref(), [64, 48], 25.0)?;
@@ -36,7 +36,7 @@ pub fn has_ffmpeg() -> bool {
 ///     }
 ///     film.finish()?;
 /// }
-/// # Ok::<(), autosplats_film::Error>(())
+/// # Ok::<(), autosplats_output::Error>(())
 /// ```
 #[derive(Debug)]
 pub struct Film {

@@ -13,7 +13,12 @@ use exr::prelude::{Encoding, Image, SpecificChannels, Vec2, WritableImage as _};
 /// * `N.X N.Y N.Z`: normal in world space.
 /// * `radius`, `kradius`, `curvature`: those of the splats.
 /// * `index`: index of the point, a whole number; `u32::MAX` for none.
-pub(crate) fn write_exr(frame: &Frame<'_>, camera: &Camera, writer: &mut (impl Write + Seek)) -> Result<()> {
+///
+/// The frame must have all layers, see [`Settings::all_layers`](autosplats::Settings::all_layers).
+///
+/// # Errors
+/// Those of the writer, and an unusable camera.
+pub fn write_exr(frame: &Frame<'_>, camera: &Camera, writer: impl Write + Seek) -> Result<()> {
     let Frame { image, layers, .. } = *frame;
     let [right, down, forward] = camera.axes().map_err(Error::other)?.map(|axis| axis.as_vec3());
     let pixel = |Vec2(x, y): Vec2<usize>| {

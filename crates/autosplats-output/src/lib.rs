@@ -1,7 +1,7 @@
-//! Successive pictures as numbered files, or as a film made by ffmpeg.
+//! Pictures as PNG, their layers as OpenEXR, and successive pictures as numbered files or as a film made by ffmpeg.
 //!
 //! ```no_run
-//! use autosplats_film::{Film, Target};
+//! use autosplats_output::{Film, Target};
 //!
 //! # fn pictures() -> Vec<autosplats::Image> { Vec::new() }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -16,20 +16,26 @@
 //! # }
 //! ```
 
+mod exr;
 mod film;
+mod png;
 mod target;
 
+pub use exr::write_exr;
 pub use film::{Film, has_ffmpeg};
+pub use png::write_png;
 pub use target::{Frames, Target, has_number};
 
 use std::path::PathBuf;
+
+use autosplats::cloud::ErrorKind;
 
 /// Errors of making pictures and films.
 ///
 /// # Examples
 ///
 /// ```
-/// use autosplats_film::Target;
+/// use autosplats_output::Target;
 ///
 /// let Err(error) = Target::new("turn.gif".as_ref()) else { panic!("a GIF is no film") };
 /// assert!(error.to_string().starts_with("turn.gif: "));
@@ -59,4 +65,17 @@ pub enum Error {
     /// ffmpeg failed. The value is its last message.
     #[error("ffmpeg: {0}")]
     Ffmpeg(String),
+}
+
+impl Error {
+    /// The kind of this error.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Name { .. } => ErrorKind::Argument,
+            Self::Io { source, .. } => source.into(),
+            Self::NoFfmpeg(_) => ErrorKind::Unsupported,
+            Self::Ffmpeg(_) => ErrorKind::Io,
+        }
+    }
 }

@@ -16,7 +16,7 @@ const DIGITS: usize = 5;
 /// ```
 /// use std::path::PathBuf;
 ///
-/// use autosplats_film::{Error, Target};
+/// use autosplats_output::{Error, Target};
 ///
 /// let Target::Frames(frames) = Target::new("turn_%03d.png".as_ref())? else { panic!("a film") };
 /// assert_eq!(frames.file(7), PathBuf::from("turn_007.png"));
@@ -37,13 +37,13 @@ pub enum Target {
 /// # Examples
 ///
 /// ```
-/// use autosplats_film::Target;
+/// use autosplats_output::Target;
 ///
 /// let target = Target::new("frames/turn_%03d.png".as_ref())?;
 /// let Target::Frames(frames) = target else { panic!("a film") };
 /// assert!(frames.file(12).ends_with("turn_012.png"));
 /// assert!(frames.pattern().ends_with("turn_….png"));
-/// # Ok::<(), autosplats_film::Error>(())
+/// # Ok::<(), autosplats_output::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frames {
@@ -91,13 +91,13 @@ impl Target {
     /// ```
     /// use std::path::PathBuf;
     ///
-    /// use autosplats_film::Target;
+    /// use autosplats_output::Target;
     ///
     /// let Target::Frames(one) = Target::one("scan.png".as_ref())? else { panic!("a film") };
     /// assert_eq!(one.file(0), PathBuf::from("scan.png"));
     /// let Target::Frames(many) = Target::new("scan.png".as_ref())? else { panic!("a film") };
     /// assert_eq!(many.file(0), PathBuf::from("scan_00000.png"));
-    /// # Ok::<(), autosplats_film::Error>(())
+    /// # Ok::<(), autosplats_output::Error>(())
     /// ```
     pub fn one(path: &Path) -> Result<Self, Error> {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -114,7 +114,7 @@ impl Target {
     /// # Examples
     ///
     /// ```
-    /// use autosplats_film::Target;
+    /// use autosplats_output::Target;
     ///
     /// # let folder = tempfile::tempdir()?;
     /// # let folder = folder.path();
@@ -154,7 +154,7 @@ impl Frames {
 /// # Examples
 ///
 /// ```
-/// use autosplats_film::has_number;
+/// use autosplats_output::has_number;
 ///
 /// assert!(has_number("turn_%05d.png"));
 /// assert!(!has_number("50%.png"));

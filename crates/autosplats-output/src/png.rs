@@ -10,7 +10,22 @@ use image::{ExtendedColorType, ImageEncoder as _};
 ///
 /// All image rows use the Paeth filter. Choosing the best filter for each row takes longer and does not make files of
 /// such pictures smaller.
-pub(crate) fn write_png(image: &Image, alpha: bool, writer: &mut impl Write) -> Result<()> {
+///
+/// # Errors
+/// Those of the writer.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_output::write_png;
+///
+/// let image = autosplats::Image { width: 1, height: 1, pixels: vec![[9, 9, 9, 255]], ..Default::default() };
+/// let mut file = Vec::new();
+/// write_png(&image, false, &mut file)?;
+/// assert!(file.starts_with(b"\x89PNG"));
+/// # Ok::<(), std::io::Error>(())
+/// ```
+pub fn write_png(image: &Image, alpha: bool, writer: impl Write) -> Result<()> {
     let encoder = PngEncoder::new_with_quality(writer, CompressionType::Fast, FilterType::Paeth);
     let Image { width, height, pixels, .. } = image;
     let written = if alpha {

@@ -1,20 +1,16 @@
 //! Outputs: checked before any work, written completely or not at all.
 
-mod exr;
-mod png;
-
 use std::collections::HashSet;
-use std::fs::{File, metadata};
-use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write, stdout};
+use std::fs::{File, create_dir_all, metadata};
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Error, PointCloud, temporary_beside, write_whole};
 use autosplats_formats::check_writable;
 
-pub(crate) use self::exr::write_exr;
-pub(crate) use self::png::write_png;
+use crate::console::Console;
 use crate::exit::{Exit, Failure};
-use crate::interrupt;
+use crate::interrupt::Interrupt;
 use crate::progress::Bar;
 
 /// Files that are read. No output may replace one.
@@ -37,7 +33,7 @@ impl ReadFiles {
 }
 
 /// Fails if the path cannot be written, or would overwrite an input.
-pub(crate) fn check_target(path: &Path, inputs: &ReadFiles) -> Result<(), Failure> {
+pub(crate) fn check_target(path: &Path, inputs: &ReadFiles, console: &Console) -> Result<(), Failure> {
     let folder = folder_of(path);
     let shown = path.display();
     if path.is_dir() || path.file_name().is_none() {
@@ -48,26 +44,34 @@ pub(crate) fn check_target(path: &Path, inputs: &ReadFiles) -> Result<(), Failur
     }
     inputs.check(path)?;
     // Creating a file is the only reliable check that one can be created.
-    let _writing = interrupt::writing();
+    let _writing = console.interrupt().writing();
     temporary_beside(path, ".tmp")
         .map_err(|error| cannot_write(path, &error))?
         .close()
         .map_err(|error| cannot_write(path, &error))
 }
 
+/// Creates a folder and those above it.
+pub(crate) fn create_folder(path: &Path) -> Result<(), Failure> {
+    create_dir_all(path)
+        .map_err(|error| Failure::new(Exit::Output, format!("{}: cannot create the folder: {error}", path.display())))
+}
+
 /// Writes a file atomically through `write`, and returns its size in bytes.
 pub(crate) fn write_file(
     path: &Path,
+    console: &Console,
     write: impl FnOnce(&mut BufWriter<Stoppable<'_>>) -> std::io::Result<()>,
 ) -> Result<u64, Failure> {
     // A symbolic link stays, and its target is replaced.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let interrupt = console.interrupt();
     let failed = |error: std::io::Error| cannot_write(path, &error);
-    let _writing = interrupt::writing();
+    let _writing = interrupt.writing();
     write_whole(&target, failed, |file| {
-        let mut writer = BufWriter::with_capacity(1 << 18, Stoppable(file.get_mut()));
+        let mut writer = BufWriter::with_capacity(1 << 18, Stoppable { file: file.get_mut(), interrupt });
         let written = write(&mut writer).and_then(|()| writer.flush());
-        if interrupt::requested() {
+        if interrupt.requested() {
             return Err(Failure::interrupted());
         }
         written.map_err(failed)
@@ -76,11 +80,11 @@ pub(crate) fn write_file(
 }
 
 /// Writes a cloud atomically in the format of the path's extension. Returns the file's size in bytes.
-pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, quiet: bool) -> Result<u64, Failure> {
+pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, console: &Console) -> Result<u64, Failure> {
     // A symbolic link stays, and its target is replaced.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let bar = Bar::on_file("writing", path, quiet);
-    let _writing = interrupt::writing();
+    let bar = Bar::on_file("writing", path, console);
+    let _writing = console.interrupt().writing();
     match autosplats_formats::write(cloud, &target, &bar) {
         Ok(()) => metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
         Err(Error::Cancelled) => Err(Failure::interrupted()),
@@ -90,9 +94,14 @@ pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, quiet: bool) -> Resul
 }
 
 /// Fails if the cloud's output has an unknown format, exists without `force`, or cannot be written.
-pub(crate) fn check_cloud_target(path: &Path, force: bool, inputs: &ReadFiles) -> Result<(), Failure> {
-    check_writable(path).map_err(Failure::usage)?;
-    check_target(path, inputs)?;
+pub(crate) fn check_cloud_target(
+    path: &Path,
+    force: bool,
+    inputs: &ReadFiles,
+    console: &Console,
+) -> Result<(), Failure> {
+    check_writable(path)?;
+    check_target(path, inputs, console)?;
     if !force && path.exists() {
         return Err(Failure::new(Exit::Output, format!("{}: already exists; --force replaces it", path.display())));
     }
@@ -100,40 +109,28 @@ pub(crate) fn check_cloud_target(path: &Path, force: bool, inputs: &ReadFiles) -
 }
 
 /// A file whose writes fail after Ctrl-C, so that a long write ends early.
-pub(crate) struct Stoppable<'a>(&'a mut File);
+pub(crate) struct Stoppable<'a> {
+    file: &'a mut File,
+    interrupt: &'a Interrupt,
+}
 
 impl Write for Stoppable<'_> {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        if interrupt::requested() {
+        if self.interrupt.requested() {
             // Not `ErrorKind::Interrupted`, on which callers try again.
             return Err(std::io::Error::other("interrupted"));
         }
-        self.0.write(bytes)
+        self.file.write(bytes)
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        self.0.flush()
+        self.file.flush()
     }
 }
 
 impl Seek for Stoppable<'_> {
     fn seek(&mut self, position: SeekFrom) -> std::io::Result<u64> {
-        self.0.seek(position)
-    }
-}
-
-/// Prints a line of data on standard output. A closed pipe is no error.
-pub(crate) fn print_line(line: &str) -> Result<(), Failure> {
-    print_bytes(format!("{line}\n").as_bytes())
-}
-
-/// Prints data on standard output. A closed pipe is no error.
-pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
-    match stdout().write_all(bytes) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Failure::new(Exit::Output, format!("standard output: {error}")))
-        }
-        _ => Ok(()),
+        self.file.seek(position)
     }
 }
 

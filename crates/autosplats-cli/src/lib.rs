@@ -1,0 +1,121 @@
+//! The `autosplats` command, callable within a process: renders raw point clouds as lit surfaces.
+//!
+//! The command is thin: `args` is what was typed; each command turns it into one job for the libraries. Data and
+//! messages for people go to the two streams of a [`Console`].
+
+mod args;
+mod bench;
+mod choices;
+mod console;
+mod convert;
+mod demo;
+mod device;
+mod doctor;
+mod exit;
+mod first_radius;
+mod info;
+mod input;
+mod interrupt;
+mod normals;
+mod output;
+mod pages;
+mod progress;
+mod render;
+mod threads;
+mod topics;
+mod values;
+mod view;
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use autosplats_sources::Source;
+use clap::error::ErrorKind;
+use clap::{CommandFactory as _, Parser as _};
+
+use crate::args::{Command, CommandLine};
+pub use crate::console::Console;
+pub use crate::exit::Exit;
+use crate::exit::{Failure, suggest};
+pub use crate::interrupt::Interrupt;
+use crate::threads::with_threads;
+
+/// Runs the command with `arguments`, without the program's name, and returns its exit code: 0, or that of an [`Exit`].
+///
+/// The process stays as it is, except for the number of threads: the first call of a process decides it.
+pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>, console: &Console) -> u8 {
+    let words = std::iter::once("autosplats".into()).chain(arguments.into_iter().map(Into::into));
+    let outcome = match CommandLine::try_parse_from(words) {
+        Ok(command_line) => dispatch(command_line, console),
+        // clap returns --help and --version as errors too.
+        Err(answer) if !answer.use_stderr() => console.print_line(answer.render().to_string().trim_end()),
+        Err(help) if help.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            console.message(help.render().to_string().trim_end());
+            return Exit::Usage as u8;
+        }
+        Err(error) => Err(Failure::usage(one_line(&error))),
+    };
+    let code = match outcome {
+        Ok(()) => 0,
+        Err(Failure { exit, message }) => {
+            console.error(message);
+            exit as u8
+        }
+    };
+    console.flush();
+    code
+}
+
+fn dispatch(command_line: CommandLine, console: &Console) -> Result<(), Failure> {
+    let Some(command) = command_line.command else { return without_command(command_line.rest, console) };
+    let Some(run) = command.run() else { return start(command, console) };
+    let (threads, console) = (run.threads, console.quiet(run.quiet));
+    match command {
+        // A window belongs to the thread that opens it.
+        Command::View(args) => {
+            threads::start_threads(threads)?;
+            view::run(&args)
+        }
+        command => with_threads(threads, || start(command, &console)),
+    }
+}
+
+fn start(command: Command, console: &Console) -> Result<(), Failure> {
+    match command {
+        Command::View(args) => view::run(&args),
+        Command::Render(args) => render::run(*args, console),
+        Command::Convert(args) => convert::run(&args, console),
+        Command::Normals(args) => normals::run(&args, console),
+        Command::Demo(args) => demo::run(&args, console),
+        Command::Info(args) => info::run(&args, console),
+        Command::Topics(args) => topics::run(&args, console),
+        Command::Bench(args) => bench::run(&args, console),
+        Command::Doctor(args) => doctor::run(&args, console),
+        Command::Completions(args) => pages::completions(&args, console),
+        Command::Man(args) => pages::manual(&args, console),
+    }
+}
+
+/// Views inputs that have no command. A word that is neither an input nor a command is an error with a suggestion.
+fn without_command(typed: Vec<String>, console: &Console) -> Result<(), Failure> {
+    let first = typed.first().map_or("", String::as_str);
+    if first.starts_with('-') || Source::is_address(first) || first.contains('.') || Path::new(first).exists() {
+        let words = ["autosplats".into(), "view".into()].into_iter().chain(typed);
+        let command_line = CommandLine::try_parse_from(words).map_err(|error| Failure::usage(one_line(&error)))?;
+        return dispatch(command_line, console);
+    }
+    let commands = CommandLine::command();
+    let names = commands.get_subcommands().map(clap::Command::get_name);
+    Err(Failure::usage(format!("no command is called '{first}'; {} (see --help)", suggest(first, names))))
+}
+
+/// The error in one line, without the usage.
+fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let paragraphs = text.split("\n\n").filter(|part| !part.starts_with("Usage:") && !part.starts_with("For more"));
+    let plain = |part: &str| {
+        let part = part.trim().trim_start_matches("error: ").trim_start_matches("tip: ");
+        part.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    format!("{} (see --help)", paragraphs.map(plain).collect::<Vec<_>>().join("; "))
+}
