@@ -15,10 +15,6 @@ const STAGES: [&str; 8] = ["project", "search", "fit", "normals", "adapt", "spla
 /// Members of the workspace that are not below `crates`.
 const OTHER_CRATES: [&str; 3] = ["quality", "fuzz", "xtask"];
 
-/// Circles of rooms that are known and still to be cut, by crate and folder. None may be added, and one that is cut
-/// leaves the list.
-const KNOWN_CIRCLES: [(&str, &[&str]); 0] = [];
-
 /// Which room uses which, with one file as the witness of each arrow.
 type Arrows = BTreeMap<(String, String), PathBuf>;
 
@@ -36,25 +32,16 @@ pub(crate) fn check(root: &Path) -> Result<()> {
         if name == "crates/autosplats" {
             wrong.extend(folders.get("").into_iter().flat_map(against_the_frame));
         }
-        let mut closed = Vec::new();
         for (folder, arrows) in &folders {
             for circle in circles(arrows) {
-                closed.push((format!("{name}{folder}"), circle, arrows));
-            }
-        }
-        let known = |place: &str, circle: &[&str]| KNOWN_CIRCLES.contains(&(place, circle));
-        for (place, circle, arrows) in closed.iter().filter(|(place, circle, _)| !known(place, circle)) {
-            let files =
-                arrows.iter().filter(|((from, to), _)| [from, to].iter().all(|room| circle.contains(&room.as_str())));
-            let files: Vec<_> =
-                files.map(|((from, to), file)| format!("{from} -> {to} ({})", file.display())).collect();
-            wrong.push(format!("{place}: a circle of rooms {}:\n    {}", circle.join(", "), files.join("\n    ")));
-        }
-        let own =
-            |place: &str| place.strip_prefix(name).is_some_and(|folder| folder.is_empty() || folder.starts_with('/'));
-        for (place, known) in KNOWN_CIRCLES.iter().filter(|(place, _)| own(place)) {
-            if !closed.iter().any(|(other, circle, _)| other == place && circle == known) {
-                wrong.push(format!("{place}: the circle {} is no more: take it off KNOWN_CIRCLES", known.join(", ")));
+                let within = |room: &String| circle.contains(&room.as_str());
+                let files: Vec<_> = arrows
+                    .iter()
+                    .filter(|((from, to), _)| within(from) && within(to))
+                    .map(|((from, to), file)| format!("{from} -> {to} ({})", file.display()))
+                    .collect();
+                let rooms = circle.join(", ");
+                wrong.push(format!("{name}{folder}: a circle of rooms {rooms}:\n    {}", files.join("\n    ")));
             }
         }
         let arrows: usize = folders.values().map(Arrows::len).sum();
