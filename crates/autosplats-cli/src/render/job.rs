@@ -150,7 +150,8 @@ impl Job {
         cloud: &PointCloud,
         camera: &Camera,
     ) -> Result<Frame<'a>, Failure> {
-        Ok(renderer.render(cloud, camera, self.rendered_size(), &self.settings_for(cloud))?)
+        let go_on = || !self.console.interrupt().requested();
+        Ok(renderer.render_while(cloud, camera, self.rendered_size(), &self.settings_for(cloud), &go_on)?)
     }
 
     /// Fixes what all pictures share, by the first of them.
