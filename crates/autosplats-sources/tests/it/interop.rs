@@ -1,7 +1,8 @@
 //! Reads recordings written by other programs. `interop/recordings.py` writes them and describes their content.
 //!
 //! Ignored by default, since the test needs Python with the packages of `interop/requirements.txt`. `cargo xtask peers`
-//! installs them, or run: `AUTOSPLATS_PYTHON=python3 cargo test -p autosplats-cloud --test it interop:: -- --ignored`.
+//! installs them. To run the test with another Python:
+//! `AUTOSPLATS_PYTHON=python3 cargo test -p autosplats-sources --test it interop:: -- --ignored`.
 
 use std::{path::Path, process::Command, time::Duration};
 

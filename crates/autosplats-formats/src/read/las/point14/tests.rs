@@ -256,7 +256,7 @@ fn real_records_are_those_of_the_crate() {
     }
 }
 
-/// `cargo test --release -p autosplats-cloud --lib -- --ignored --nocapture as_fast`.
+/// `cargo test --release -p autosplats-formats --lib -- --ignored --nocapture as_fast`.
 #[test]
 #[ignore = "measures"]
 fn as_fast_as_the_crate() {
