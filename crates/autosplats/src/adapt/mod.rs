@@ -32,6 +32,8 @@
 //! Neighbours in a depth camera err alike, so balls of these sizes do not show the camera's noise. That noise is
 //! estimated from the scan as a whole (`depth`) and used where it is the larger one. Surfels then move along the
 //! sensor's ray.
+// Differs from the paper: the paper fits every surfel to k neighbours. See docs/decisions/0005-noise-level.md and
+// docs/decisions/0006-scale-by-agreement.md.
 
 mod cells;
 mod choose;

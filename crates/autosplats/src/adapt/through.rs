@@ -6,6 +6,7 @@
 //! are seen through it than on it, unless its surroundings are a surface. Points close to the eye are sparse only on
 //! the screen. So each point behind the disc counts for as many as would fall there at the distance of the disc. See
 //! docs/decisions/0011-seen-through.md.
+// Differs from the paper: the paper draws every disc as wide as its neighbourhood calls for, whatever it hides.
 
 use glam::Vec3;
 use pulp::Simd;

@@ -13,6 +13,8 @@
 //! window for the radius known to suffice. If only σ < k neighbours are known, the radius grows by √(k/σ) as in §5.2.
 //! The result is exact, and does not depend on the points that share a block. Only the neighbours of a bounded search
 //! depend on what was read.
+// Differs from the paper: the paper iterates until 99.9 % of the points are found. See
+// docs/decisions/0015-search-engines.md.
 
 mod cpu;
 pub(crate) mod gpu;

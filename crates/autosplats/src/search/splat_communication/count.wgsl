@@ -1,6 +1,6 @@
 // Counts the queries that have not converged, one invocation each.
 //
-// Differs from the paper, which uses an occlusion query [Paper, §5.2]: WebGPU's only tell whether there are any.
+// Differs from the paper: the paper uses an occlusion query [Paper, §5.2]; WebGPU's only tell whether there are any.
 //
 // Reads: points, queries, counters, arguments, the position texture and both radius textures. Writes: convergence.
 
