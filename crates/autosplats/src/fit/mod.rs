@@ -109,5 +109,6 @@ impl Surfel {
     }
 }
 
-/// The surfels of a list of screen points, in the order of the list.
+/// The surfels of a list of screen points, in the order of the list. In a frame `fit` writes them; then `adapt` moves,
+/// turns and resizes them, `orient` marks backs, and `splat/over_time` averages them, all in place.
 pub(crate) type Surfels = Vec<Surfel>;
