@@ -50,12 +50,12 @@ pub struct Counts {
     /// Points that own a pixel, or half of one, in the picture or its margin because they are the nearest there. The
     /// remaining points are hidden behind them.
     pub visible: usize,
-    /// Visible points reconstructed in the first pass.
+    /// Visible points reconstructed in the first round.
     pub active: usize,
     /// Visible points that are postponed by grid culling, or that are too far out in the margin to be more than
     /// neighbours.
     pub passive: usize,
-    /// Passive points that the first pass left visible and the second pass reconstructed.
+    /// Passive points that the first round left visible and the second round reconstructed.
     pub recovered: usize,
     /// Points discarded because they have no neighbours or do not belong to the surface of their neighbours.
     pub outliers: usize,
