@@ -84,8 +84,7 @@ impl From<autosplats::Error> for Failure {
         match error {
             autosplats::Error::Setting { name, value, range } => {
                 let option = OPTIONS.iter().find_map(|(field, option)| (*field == name).then_some(*option));
-                let or = if name == "k" { ", or 'auto'" } else { "" };
-                Self::usage(format!("{} {value}: it must be {range}{or}", option.unwrap_or(name)))
+                Self::usage(format!("{} {value}: it must be {range}", option.unwrap_or(name)))
             }
             error => Self::of(error.kind(), error),
         }

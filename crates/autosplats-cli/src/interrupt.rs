@@ -5,8 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A request to end a command. Clones are the same request.
 ///
-/// A command stops at the next chance and removes its temporary files. Work without an end of its own, such as pictures
-/// of live input, finishes what it has at the first request, and stops at the second.
+/// A request holds until the command that runs ends, or the next one if none runs. The command stops at the next chance
+/// and removes its temporary files. Work without an end of its own, such as pictures of live input, finishes what it
+/// has at the first request, and stops at the second.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt(Arc<State>);
 
@@ -31,6 +32,12 @@ impl Interrupt {
     /// Lock that is held while a temporary file exists. A process that holds it can end and leaves no such file.
     pub fn writing(&self) -> MutexGuard<'_, ()> {
         self.0.write_lock.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Forgets all requests, as a command ends.
+    pub(crate) fn clear(&self) {
+        let State { end_now, finish_first, finishing, .. } = &*self.0;
+        [end_now, finish_first, finishing].into_iter().for_each(|flag| flag.store(false, Ordering::SeqCst));
     }
 
     /// Makes the next request only ask the work to [finish](Self::ending).

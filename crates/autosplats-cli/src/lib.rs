@@ -63,6 +63,7 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>, console: &C
         }
     };
     console.flush();
+    console.interrupt().clear();
     code
 }
 

@@ -56,4 +56,5 @@ fn a_request_ends_the_command() {
     assert_eq!(run(["convert", &sphere, &copy], &console), 130, "{}", messages.text());
     assert_eq!(messages.text(), "error: interrupted\n");
     assert_eq!(folder.list(), ["sphere.ply"], "nothing is left behind");
+    assert_eq!(run(["convert", &sphere, &copy], &console), 0, "the request ended with its command");
 }

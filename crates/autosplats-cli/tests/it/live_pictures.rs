@@ -59,7 +59,7 @@ fn ten_minutes_of_live_points_become_pictures() {
     let seconds: u64 = std::env::var("AUTOSPLATS_LIVE_SECONDS").map_or(600, |text| text.parse().unwrap());
     let python = std::env::var_os("AUTOSPLATS_PYTHON").expect("AUTOSPLATS_PYTHON names a Python with what is needed");
     let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).unwrap().port();
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../autosplats-cloud/tests/interop/publish_points.py");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../autosplats-sources/tests/interop/publish_points.py");
     let arguments = [port.to_string(), POINTS.to_string(), seconds.to_string()];
     let mut sender =
         Command::new(python).arg(script).args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).spawn().unwrap();
