@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use autosplats::{Renderer, Settings, still_supersample};
 use autosplats_output::write_png;
-use autosplats_scenes::Scene;
+use autosplats_scenes::{SCENE_PREFIX, Scene};
 
 use crate::args::DemoArgs;
 use crate::console::Console;
@@ -25,7 +25,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
     for (name, about) in Scene::names() {
         let path = out.join(name).with_extension("png");
         check_target(&path, &ReadFiles::default(), console)?;
-        let input = format!("scene:{name}");
+        let input = format!("{SCENE_PREFIX}{name}");
         let inputs = Inputs::scene(name)?;
         let Some(scene) = inputs.only_scene() else { continue };
 

@@ -9,7 +9,7 @@ use crate::progress::Bar;
 use crate::values::FirstRadius;
 
 /// Fraction of the visible points whose k-radius must be exact with the best radius, as in the paper [Paper, §8.1].
-const ACCURACY: f64 = 0.999;
+pub(crate) const ACCURACY: f64 = 0.999;
 
 /// Sets the best first radius, if `first_radius` asks for it and the engine takes one. A note states the radius.
 pub(crate) fn settle_first_radius(

@@ -17,9 +17,6 @@ use crate::exit::Failure;
 use crate::output::write_file;
 use crate::values::Ortho;
 
-/// Default vertical field of view, in degrees.
-const DEFAULT_FOV_DEG: f64 = 40.0;
-
 /// A camera that is placed once the points are known.
 #[derive(Debug)]
 pub(super) struct CameraJob {
@@ -120,7 +117,7 @@ impl CameraJob {
     fn projection(&self) -> Projection {
         match self.ortho {
             Some(Ortho(height)) => Projection::OrthographicHeight(height.unwrap_or(1.0)),
-            None => Projection::PerspectiveFovDeg(self.fov_deg.unwrap_or(DEFAULT_FOV_DEG)),
+            None => Projection::PerspectiveFovDeg(self.fov_deg.unwrap_or(Projection::USUAL_FOV_DEG)),
         }
     }
 }

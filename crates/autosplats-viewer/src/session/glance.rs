@@ -10,9 +10,6 @@ use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 use crate::session::document::bounds_of;
 use crate::session::{Document, Input, Layer};
 
-/// Vertical field of view of the first picture, degrees.
-pub(crate) const FOV_DEG: f64 = 40.0;
-
 /// What the first view depends on besides the points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ViewFrame {
@@ -63,7 +60,7 @@ impl FirstLook {
         let mut alone = Document::default();
         alone.add(Layer::new(&*input.name, None, Arc::clone(cloud)).opened_at(input.world_from_input));
         let overview = alone.overview();
-        let projection = Projection::PerspectiveFovDeg(FOV_DEG);
+        let projection = Projection::PerspectiveFovDeg(Projection::USUAL_FOV_DEG);
         let up = frame.up.unwrap_or(axes);
         let camera = Camera::fit(&overview, up, ViewDirection::Auto, frame.aspect, projection).ok();
         Self { axes, bounds: bounds_of(&overview), camera, frame }

@@ -24,7 +24,7 @@ pub(crate) use self::document::{
     Replace, SelectMode, ShownCloud,
 };
 pub(crate) use self::editing::CachedCounts;
-pub(crate) use self::glance::{FOV_DEG, FirstLook, SharedViewFrame, ViewFrame};
+pub(crate) use self::glance::{FirstLook, SharedViewFrame, ViewFrame};
 pub(crate) use self::kept::StoredInput;
 pub(crate) use self::loading::{JobId, JobNews, Loader, Watch};
 pub(crate) use self::measure::Ruler;

@@ -6,7 +6,7 @@ use autosplats::{Camera, Projection, ViewDirection};
 use autosplats_sources::Source;
 
 use super::View;
-use crate::session::{Arrival, FOV_DEG, Session, ViewFrame};
+use crate::session::{Arrival, Session, ViewFrame};
 
 impl View {
     /// Receives that points have arrived. The camera moves to show them if they are the first ones, or if the user has
@@ -85,7 +85,7 @@ impl View {
             return;
         }
         let cloud = session.document().overview();
-        let fov = if direction == ViewDirection::Auto { FOV_DEG } else { self.navigation.fov_deg() };
+        let fov = if direction == ViewDirection::Auto { Projection::USUAL_FOV_DEG } else { self.navigation.fov_deg() };
         let projection = if self.navigation.is_orthographic() {
             Projection::OrthographicHeight(1.0)
         } else {

@@ -12,8 +12,6 @@ use autosplats::{Camera, Projection};
 const LAG_S: f64 = 0.06;
 /// Fraction of the distance, or radians, below which the camera has arrived: a twentieth of a pixel.
 const ARRIVAL_TOLERANCE: f64 = 5e-5;
-/// Default vertical field of view of the perspective camera, degrees.
-const FOV_DEG: f64 = 40.0;
 /// Radians turned by a drag over the picture's height.
 const DRAG_TURN_RAD: f64 = std::f64::consts::PI;
 /// Radians turned by the arrow keys per second.
@@ -109,7 +107,14 @@ impl Navigation {
     /// A camera that looks at the origin from 3 units away.
     pub(crate) fn new() -> Self {
         let pose = Pose { pivot: DVec3::ZERO, distance: 3.0, world_from_view: orientation(DVec3::Y, DVec3::Z) };
-        Self { shown: pose, goal: pose, fov_deg: FOV_DEG, orthographic: false, up: DVec3::Z, scene: (DVec3::ZERO, 1.0) }
+        Self {
+            shown: pose,
+            goal: pose,
+            fov_deg: Projection::USUAL_FOV_DEG,
+            orthographic: false,
+            up: DVec3::Z,
+            scene: (DVec3::ZERO, 1.0),
+        }
     }
 
     /// Sets the ball around the scene, by its middle and radius, and the up direction.

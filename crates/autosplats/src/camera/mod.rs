@@ -58,6 +58,11 @@ pub enum Projection {
     OrthographicHeight(f64),
 }
 
+impl Projection {
+    /// Usual vertical field of view of a picture, degrees.
+    pub const USUAL_FOV_DEG: f64 = 40.0;
+}
+
 /// A [`Camera`] prepared for one picture of one cloud, with rotation and focal length in `f32`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct View {

@@ -12,11 +12,10 @@ use super::scenes::PaperScene;
 use crate::bench::{TREE_BUILD_PREFIX, median};
 use crate::device::Device;
 use crate::exit::Failure;
+use crate::first_radius::ACCURACY;
 
 /// The k of Table 1.
 pub(super) const K: u32 = 10;
-/// Fraction of the points whose k-radius must be exact, as in the paper.
-const ACCURACY: f64 = 0.999;
 /// Time in milliseconds above which a frame is measured only once, at its first run.
 const SLOW_MS: f64 = 3000.0;
 /// Largest relative difference of equal k-radii.

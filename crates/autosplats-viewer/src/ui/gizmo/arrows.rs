@@ -4,7 +4,7 @@
 use autosplats::cloud::glam::{DMat4, DVec3};
 use eframe::egui::{Color32, Painter, Pos2, Stroke};
 
-use super::lens::{Shape, WindowLens, along, angle, on_plane};
+use super::lens::{GRABBED_COLOR, Shape, WindowLens, along, angle, on_plane};
 use super::{Handle, line};
 use crate::session::document::about;
 use crate::session::measure::angle_text;
@@ -18,7 +18,6 @@ const RING_RADIUS_POINTS: f64 = 96.0;
 const RING_CORNER_COUNT: usize = 72;
 /// Step of a stepped rotation, degrees.
 const STEP_DEG: f64 = 15.0;
-const GRABBED_COLOR: Color32 = Color32::from_rgb(255, 205, 60);
 /// Red, green and blue of the axes, as in the corner of the picture.
 const COLORS: [Color32; 3] =
     [Color32::from_rgb(235, 95, 85), Color32::from_rgb(150, 205, 90), Color32::from_rgb(95, 150, 255)];

@@ -3,7 +3,7 @@
 use autosplats::cloud::glam::DVec3;
 use eframe::egui::{Color32, Painter, Pos2, Stroke};
 
-use super::lens::{Shape, WindowLens, along};
+use super::lens::{GRABBED_COLOR, Shape, WindowLens, along};
 use super::{Handle, line};
 use crate::session::{ClipBox, Session};
 use crate::view::View;
@@ -13,7 +13,6 @@ const EDGE_SEGMENTS: usize = 48;
 /// Radius of a handle, screen points.
 const HANDLE_RADIUS_POINTS: f32 = 6.0;
 const EDGE: Color32 = Color32::from_rgb(120, 205, 255);
-const GRABBED_COLOR: Color32 = Color32::from_rgb(255, 205, 60);
 /// Opacity of hidden edges.
 const HIDDEN_OPACITY: f32 = 0.28;
 

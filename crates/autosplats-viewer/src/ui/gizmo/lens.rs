@@ -2,8 +2,10 @@
 
 use autosplats::cloud::glam::{DVec2, DVec3};
 use autosplats::{Camera, Lens};
-use eframe::egui::{Pos2, Rect, vec2};
+use eframe::egui::{Color32, Pos2, Rect, vec2};
 
+/// Colour of the handle that is dragged or would be.
+pub(super) const GRABBED_COLOR: Color32 = Color32::from_rgb(255, 205, 60);
 /// Largest distance from the pointer to a handle that takes it, screen points.
 const REACH_POINTS: f32 = 9.0;
 /// Advantage of a dot over a line in the choice of the nearest handle, screen points.
