@@ -42,29 +42,37 @@ use crate::threads::with_threads;
 
 /// Runs the command with `arguments`, without the program's name, and returns its exit code: 0, or that of an [`Exit`].
 ///
-/// The process stays as it is, except for the number of threads: the first call of a process decides it.
+/// The process stays as it is, except for its threads: the first call starts them, and a later one that asks for
+/// another number gets a pool of its own.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>, console: &Console) -> u8 {
     let words = std::iter::once("autosplats".into()).chain(arguments.into_iter().map(Into::into));
-    let outcome = match CommandLine::try_parse_from(words) {
+    let code = match CommandLine::try_parse_from(words) {
+        Err(help) if help.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            console.message(help.render().to_string().trim_end());
+            Exit::Usage as u8
+        }
+        parsed => exit_code(parsed, console),
+    };
+    console.flush();
+    console.interrupt().clear();
+    code
+}
+
+/// Performs what was typed. Prints an error and returns the exit code.
+fn exit_code(parsed: Result<CommandLine, clap::Error>, console: &Console) -> u8 {
+    let outcome = match parsed {
         Ok(command_line) => dispatch(command_line, console),
         // clap returns --help and --version as errors too.
         Err(answer) if !answer.use_stderr() => console.print_line(answer.render().to_string().trim_end()),
-        Err(help) if help.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            console.message(help.render().to_string().trim_end());
-            return Exit::Usage as u8;
-        }
         Err(error) => Err(Failure::usage(one_line(&error))),
     };
-    let code = match outcome {
+    match outcome {
         Ok(()) => 0,
         Err(Failure { exit, message }) => {
             console.error(message);
             exit as u8
         }
-    };
-    console.flush();
-    console.interrupt().clear();
-    code
+    }
 }
 
 fn dispatch(command_line: CommandLine, console: &Console) -> Result<(), Failure> {
