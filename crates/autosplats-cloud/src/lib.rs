@@ -16,6 +16,7 @@
 mod cloud;
 mod contents;
 mod crs;
+mod encoding;
 mod error;
 mod error_kind;
 mod files;
@@ -35,6 +36,7 @@ mod thin;
 pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
+pub use encoding::{Unmarked, read_text};
 pub use error::{Error, excerpt, one_line};
 pub use error_kind::ErrorKind;
 pub use files::{Bytes, temporary_beside, write_whole};

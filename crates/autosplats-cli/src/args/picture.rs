@@ -142,7 +142,7 @@ pub(crate) struct SurfaceArgs {
 pub(crate) struct LookArgs {
     /// auto, rgb, plain, height, intensity, classification, normal, curvature, radius, k-radius, depth, or the name of
     /// a field (field:NAME if a mode has the same name)
-    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = values::color)]
+    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = values::color, allow_hyphen_values = true)]
     pub(crate) color: ColorMode,
     /// Values at both ends of the colour map [default: 1st and 99th percentile of the picture]
     #[arg(long, value_name = "A..B", value_parser = values::range, allow_hyphen_values = true)]
@@ -167,6 +167,6 @@ pub(crate) struct LookArgs {
     #[arg(long, value_enum, default_value_t = BacksChoice::Toned)]
     pub(crate) backs: BacksChoice,
     /// '#rrggbb', '#top,#bottom' or transparent [default: dark grey gradient]
-    #[arg(long, value_name = "COLOR", value_parser = values::background)]
+    #[arg(long, value_name = "COLOR", value_parser = values::background, allow_hyphen_values = true)]
     pub(crate) background: Option<Background>,
 }

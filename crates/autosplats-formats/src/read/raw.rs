@@ -46,7 +46,11 @@ impl Layout {
         let with_ring: &[&str] = &["x", "y", "z", "intensity", "ring"];
         let guess =
             || [&with_ring[..4], with_ring, &with_ring[..3]].into_iter().find(|names| plausible(job.bytes, names));
-        if let Some(names) = columns::given(job)? {
+        if let Some(columns::Given { names, open }) = columns::given(job)? {
+            if open {
+                let what = "--columns ends in '...', but the length of these records has to be known; name all columns";
+                return Err(job.unsupported(what));
+            }
             let stride = SIZE * names.len();
             if !len.is_multiple_of(stride) {
                 let what = format!(

@@ -4,6 +4,7 @@
 
 mod common;
 mod e57;
+mod field_text;
 mod formats;
 mod gltf;
 mod hostile;

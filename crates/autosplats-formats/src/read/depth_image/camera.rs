@@ -1,10 +1,8 @@
 //! The camera of a depth image.
 
-use std::{
-    fs::{metadata, read_to_string},
-    path::Path,
-};
+use std::{fs::metadata, path::Path};
 
+use autosplats_cloud::read_text;
 use serde_json::Value;
 
 use super::Job;
@@ -50,7 +48,7 @@ impl Camera {
                 continue;
             }
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let Some(camera) = read_to_string(&path).ok().and_then(|text| parse(&text, width, height)) else {
+            let Some(camera) = read_text(&path).ok().and_then(|text| parse(&text, width, height)) else {
                 notes.push(format!("{name} holds no camera of 3 × 3 or 4 numbers; ignored"));
                 continue;
             };
