@@ -341,6 +341,9 @@ fn names_of_many_languages() {
     };
     let text = cyrillic("Север;Восток;Высота\n2;1.5;3\n5.25;4;6\n8;7;9.125\n");
     assert_eq!(world(&noted("a.csv", text).0), POINTS, "Eastern Windows");
+    let unit = |text: &str| noted("a.csv", text).0.crs().unit;
+    assert_eq!(unit("Länge;Breite;Höhe\n8.5;47.25;400\n"), Some(Unit::Degree), "angles");
+    assert_eq!(unit("Länge;Breite;Höhe\n1200;800;400\n"), None, "the size of a box");
     // Normals and speeds are no positions.
     let (cloud, notes) = noted("a.csv", "normal_x;normal_y;normal_z;a;b;c\n1;0;0;4;5;6\n0;1;0;7;8;9\n");
     assert!(cloud.len() == 2 && notes.contains("names no x, y and z"), "{notes}");

@@ -172,9 +172,12 @@ fn cells(dialect: &Dialect, lines: &[&[u8]], widths: Widths) -> Vec<Vec<Cell>> {
     rows
 }
 
-/// The units of positions, from the units of their columns.
-pub(super) fn crs(names: &[String], units: &[Option<Unit>], [x, _, z]: [usize; 3]) -> Crs {
+/// The units of positions, from the names and units of their columns. Words for longitude and latitude also mean the
+/// length and width of things, so the values have to be angles.
+pub(super) fn crs(names: &[String], units: &[Option<Unit>], [x, y, z]: [usize; 3], rows: &[Vec<Cell>]) -> Crs {
     let unit = |index: usize| units.get(index).copied().flatten();
-    let horizontal = if columns::is_longitude(&names[x]) { Some(Unit::Degree) } else { unit(x) };
+    let within = |column: usize, limit: f64| rows.iter().all(|row| !(row[column].number().abs() > limit));
+    let degrees = columns::is_longitude(&names[x]) && within(x, 360.0) && within(y, 90.0);
+    let horizontal = if degrees { Some(Unit::Degree) } else { unit(x) };
     Crs { unit: horizontal, vertical_unit: unit(z).filter(|_| unit(z) != horizontal), ..Crs::default() }
 }

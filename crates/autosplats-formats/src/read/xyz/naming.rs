@@ -69,7 +69,7 @@ impl Naming {
     fn fitting(header: &Header, sample: &Sample<'_>) -> Self {
         let names: Vec<String> = filled(&header.names[..sample.widths.first]);
         let axes = columns::find_axes(&names).unwrap_or([0, 1, 2]);
-        let crs = crs(&names, &header.units, axes);
+        let crs = crs(&names, &header.units, axes, &sample.cells);
         Self { names: names.into_iter().map(Some).collect(), axes, open: false, crs, notes: Vec::new() }
     }
 
@@ -112,7 +112,7 @@ impl Naming {
             return Ok(None);
         }
         let Some(axes) = columns::find_axes(&names) else { return Ok(None) };
-        let crs = crs(&names, &units, axes);
+        let crs = crs(&names, &units, axes, &sample.cells);
         let open = names.len() < sample.widths.max;
         let names: Vec<Option<String>> =
             names.into_iter().enumerate().map(|(index, name)| (index >= left_out).then_some(name)).collect();
