@@ -13,12 +13,14 @@
 //! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
+mod classes;
 mod cloud;
 mod contents;
 mod crs;
 mod error;
 mod error_kind;
 mod files;
+mod filter;
 mod geographic;
 mod guard;
 mod identity;
@@ -32,12 +34,14 @@ mod retain;
 mod sample;
 mod thin;
 
+pub use classes::class_name;
 pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use error::{Error, excerpt, one_line};
 pub use error_kind::ErrorKind;
 pub use files::{Bytes, temporary_beside, write_whole};
+pub use filter::{LeftOut, PointFilter};
 pub use geographic::LocalMetres;
 /// Vector library of the public interface.
 pub use glam;

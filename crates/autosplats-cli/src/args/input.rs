@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use autosplats_cloud::PointFilter;
 use autosplats_formats::DepthCamera;
 use clap::Args;
 
@@ -71,6 +72,11 @@ pub(crate) struct ReadingArgs {
     /// beside the image, else guessed]
     #[arg(long, value_name = "FX,FY,CX,CY[,SCALE]", value_parser = values::depth_camera)]
     pub(crate) depth_camera: Option<DepthCamera>,
+    /// Points to keep, by class, flag and return, such as ground,building or 2..6,first. A hyphen leaves out:
+    /// -noise,-withheld. One word without a hyphen has to match for classes, one for flags, one for returns. 'all' keeps
+    /// all, 'usual' all but noise (classes 7 and 18) and withheld points [default: all, but usual for pictures]
+    #[arg(long, value_name = "WORDS", allow_hyphen_values = true)]
+    pub(crate) keep: Option<PointFilter>,
     /// Keep points at (0, 0, 0), the sensor itself, which scanners write for missing returns
     #[arg(long)]
     pub(crate) keep_no_returns: bool,

@@ -83,7 +83,7 @@ impl Job {
         settings.check()?;
 
         let save_camera = camera.save_camera.clone();
-        let inputs = Inputs::new(&inputs, &input)?;
+        let inputs = Inputs::new(&inputs, &input)?.for_pictures();
         let camera = CameraJob::new(&camera)?;
         let read_files = inputs.files(camera.file());
         let named = film.as_ref().map(FilmJob::first_file);

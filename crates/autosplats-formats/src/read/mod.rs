@@ -11,6 +11,7 @@
 //! A file is not trusted: the claims of its header are checked against its size before anything is allocated.
 
 mod body;
+mod choose;
 mod columns;
 mod depth_image;
 mod describe;
@@ -43,6 +44,6 @@ pub use self::{
     options::{DepthCamera, ReadOptions},
     registry::{
         check_not_lfs_pointer, describe, describe_bytes, formats, gltf_animation, read, read_bytes, read_gltf_at,
-        read_mesh, read_mesh_bytes, read_with,
+        read_marked, read_mesh, read_mesh_bytes, read_with,
     },
 };

@@ -1,5 +1,7 @@
 //! Options of reading.
 
+use autosplats_cloud::PointFilter;
+
 /// Options of reading a file. The default suits the display of points.
 ///
 /// # Examples
@@ -25,6 +27,10 @@ pub struct ReadOptions {
     /// Names of the columns of text and headerless binary records, instead of guessed ones: `x`, `y`, `z`, `red`,
     /// `green`, `blue`, `Intensity` … in any order. `-` or `_` leaves a column out.
     pub columns: Option<Vec<String>>,
+    /// Which points to keep, by class, flag and return; `None` keeps all. The usual filter acts on LAS, and in other
+    /// formats if the file calls its classes `Classification`. Any other filter fails if the file lacks a field that
+    /// the filter needs. Previews are filtered too; triangles with a corner that is left out go.
+    pub keep: Option<PointFilter>,
     /// Camera of depth images; by default taken from a file beside the image, or guessed.
     pub depth_camera: Option<DepthCamera>,
 }

@@ -52,7 +52,11 @@ impl Frames for Sequence {
     }
 
     fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
-        Ok(vec![Arc::new(read_with(&self.files[frame], &self.options, progress)?)])
+        match read_with(&self.files[frame], &self.options, progress) {
+            // An object may leave the scene, and its frames are then empty.
+            Err(Error::NothingKept { .. }) => Ok(vec![Arc::default()]),
+            cloud => Ok(vec![Arc::new(cloud?)]),
+        }
     }
 
     fn surface(&self, frame: usize, progress: &dyn Progress) -> Result<Surface, Error> {
