@@ -67,8 +67,9 @@ pub(crate) struct ReadingArgs {
     /// [default: from the header, else guessed, with a note]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub(crate) columns: Option<Vec<String>>,
-    /// Intrinsics of depth images in pixels, and SCALE, pixel values per metre, 1000 if left out [default: from a file
-    /// beside the image, else guessed]
+    /// Intrinsics of depth images in pixels, and SCALE, pixel values per metre; without it, whole numbers are
+    /// millimetres and floats metres [default: from a file beside the image, such as ROS's camera_info.yaml, else
+    /// guessed]
     #[arg(long, value_name = "FX,FY,CX,CY[,SCALE]", value_parser = values::depth_camera)]
     pub(crate) depth_camera: Option<DepthCamera>,
     /// Keep points at (0, 0, 0), the sensor itself, which scanners write for missing returns
