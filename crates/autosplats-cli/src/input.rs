@@ -400,11 +400,22 @@ fn is_made(input: &Input) -> bool {
 /// The first points of an input that is played.
 fn first_frame(input: &Input, progress: &dyn Progress) -> Result<PointCloud, Error> {
     let mut player = input.source.play(&input.play, &input.options, progress)?;
-    let frames = player.stream().timeline().map_or(0, |timeline| timeline.stamps().len());
-    if frames > 1 {
-        progress.note(&format!("this is the first of {frames} frames"));
+    let cloud = player.first(Source::FIRST_POINTS_TIMEOUT, progress)?;
+    if let Some(which) = which_frame(&player) {
+        progress.note(&format!("this is {which}"));
     }
-    player.first(Source::FIRST_POINTS_TIMEOUT, progress).map(Arc::unwrap_or_clone)
+    Ok(Arc::unwrap_or_clone(cloud))
+}
+
+/// Which frame of several the player has [first](Player::first) found points in; `None` for a single frame and for live
+/// points.
+pub(crate) fn which_frame(player: &Player) -> Option<String> {
+    let frames = player.stream().timeline()?.len();
+    match player.position()? {
+        _ if frames < 2 => None,
+        0 => Some(format!("the first of {frames} frames")),
+        frame => Some(format!("frame {frame} of 0 to {}, the first with points", frames - 1)),
+    }
 }
 
 /// Plays a file or a folder as it changes.
@@ -421,6 +432,7 @@ fn watch(path: &Path, input: &Input) -> Result<Player, Failure> {
 fn failure(input: &Input, error: Error) -> Failure {
     match error {
         Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
+        Error::NoFrames { why, .. } => Failure::new(Exit::Input, format!("{}: {why}", input.name)),
         error => error.into(),
     }
 }

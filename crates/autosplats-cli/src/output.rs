@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Error, PointCloud, temporary_beside, write_whole};
 use autosplats_formats::check_writable;
+use autosplats_output::PictureFormat;
 
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
@@ -153,20 +154,20 @@ pub(crate) struct Picture {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
-    Png,
+    Picture(PictureFormat),
+    /// All layers.
     Exr,
 }
 
 impl Picture {
     /// Takes the format from the extension.
     pub(crate) fn new(path: PathBuf) -> Result<Self, Failure> {
-        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let format = match extension.as_str() {
-            "png" => Format::Png,
-            "exr" => Format::Exr,
-            _ => {
+        let format = match PictureFormat::of(&path) {
+            Some(format) => Format::Picture(format),
+            None if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr")) => Format::Exr,
+            None => {
                 return Err(Failure::usage(format!(
-                    "{}: unknown picture format; the name must end in .png or .exr",
+                    "{}: unknown picture format; the name must end in .png, .jpg or .exr",
                     path.display()
                 )));
             }

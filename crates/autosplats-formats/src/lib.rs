@@ -18,9 +18,11 @@
 
 mod color_scale;
 mod las;
+mod pinhole;
 mod read;
 mod write;
 
+pub use pinhole::PinholeCamera;
 pub use read::{
     Attribute, DepthCamera, Description, ReadOptions, check_not_lfs_pointer, colors_beside, describe, describe_bytes,
     formats, framing, gltf_animation, read, read_bytes, read_gltf_at, read_marked, read_mesh, read_mesh_bytes,

@@ -189,7 +189,7 @@ impl Source {
         matches!(self, Self::Recording(_)).then(|| timeline.span()).flatten()
     }
 
-    /// Reads or generates the cloud. A source that changes gives its first frame.
+    /// Reads or generates the cloud. A source that changes gives its [first](Player::first) frame with points.
     ///
     /// # Errors
     /// Those of [`read`](autosplats_formats::read), of [`Scene::sample`] or of [`play`](Self::play).

@@ -77,8 +77,10 @@ pub(super) const FORMAT_TEXTS: &[FormatText] = &[
     },
     FormatText {
         name: "depth image",
-        kept: "16-bit PNG and PGM, with intrinsics from an option or a file beside the image",
-        not_kept: "",
+        kept: "PNG and PGM of 16 bits, TIFF of 16 bits or floats, PFM, the channel of depths of OpenEXR; whole numbers are \
+               millimetres, floats metres, if nothing states another scale; swapped bytes are told and mended; intrinsics \
+               from an option or a file beside the image: ROS's `camera_info.yaml`, Open3D's JSON, bare numbers",
+        not_kept: "lens distortion; GeoTIFF, disparities and pictures of 8 bits are refused",
     },
     FormatText {
         name: "OBJ",

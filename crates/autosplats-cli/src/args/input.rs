@@ -68,8 +68,9 @@ pub(crate) struct ReadingArgs {
     /// [default: from the header, else guessed, with a note]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub(crate) columns: Option<Vec<String>>,
-    /// Intrinsics of depth images in pixels, and SCALE, pixel values per metre, 1000 if left out [default: from a file
-    /// beside the image, else guessed]
+    /// Intrinsics of depth images in pixels, and SCALE, pixel values per metre; without it, whole numbers are
+    /// millimetres and floats metres [default: from a file beside the image, such as ROS's camera_info.yaml, else
+    /// guessed]
     #[arg(long, value_name = "FX,FY,CX,CY[,SCALE]", value_parser = values::depth_camera)]
     pub(crate) depth_camera: Option<DepthCamera>,
     /// Points to keep, by class, flag and return, such as ground,building or 2..6,first. A hyphen leaves out:

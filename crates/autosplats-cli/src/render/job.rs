@@ -1,13 +1,14 @@
 //! The job of `render`: its flags combined and checked before any work.
 
 use std::collections::HashSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use autosplats::{
     BYTES_PER_PIXEL, Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Reconstruction, Renderer,
     Settings, Shading, still_supersample, usual_exposure,
 };
 use autosplats_cloud::{PointCloud, check_memory};
+use autosplats_output::PictureFormat;
 
 use super::camera::CameraJob;
 use super::film::FilmJob;
@@ -79,14 +80,23 @@ impl Job {
                 "--resume: with --frames-averaged a frame depends on earlier ones; render all frames again",
             ));
         }
+        let jpeg = |path: &Path| PictureFormat::of(path) == Some(PictureFormat::Jpeg);
+        let named = film.as_ref().map(FilmJob::first_file);
+        if look.background == Some(Background::Transparent)
+            && let Some(opaque) = pictures.iter().map(|picture| &picture.path).chain(&named).find(|path| jpeg(path))
+        {
+            return Err(Failure::usage(format!(
+                "--background transparent: {} cannot be transparent; write a .png",
+                opaque.display()
+            )));
+        }
         let settings = settings(&surface, look, needs_layers);
         settings.check()?;
 
         let save_camera = camera.save_camera.clone();
         let inputs = Inputs::new(&inputs, &input)?.for_pictures();
-        let camera = CameraJob::new(&camera)?;
+        let camera = CameraJob::new(&camera, console)?;
         let read_files = inputs.files(camera.file());
-        let named = film.as_ref().map(FilmJob::first_file);
         let targets = pictures.iter().map(|picture| &picture.path).chain(&named).chain(&save_camera);
         let mut seen = HashSet::new();
         for target in targets {

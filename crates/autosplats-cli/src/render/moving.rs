@@ -13,7 +13,7 @@ use autosplats_sources::Timeline;
 use super::film::FilmJob;
 use super::job::Job;
 use super::pictures::{FrameReport, FrameTally, QueuedPicture, Writer};
-use super::placement::SharedPlacement;
+use super::placement::{MIN_POINTS, SharedPlacement};
 use super::{camera, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -160,9 +160,17 @@ impl Moving {
     /// Places the camera so that it sees all frames, and fixes the settings that depend on the points.
     fn settle(&mut self, job: &mut Job, renderer: &mut Renderer, frames: &Range<usize>) -> Result<Camera, Failure> {
         let bar = Bar::on_input("placing the camera", &self.names, &job.console);
-        let last = frames.len() - 1;
-        let count = frames.len().min(MAX_CAMERA_FRAMES);
-        let mut looks: Vec<usize> = (0..count).map(|look| frames.start + last * look / (count - 1).max(1)).collect();
+        // The first frame that has points is among them.
+        let mut start = frames.start;
+        for frame in frames.clone() {
+            if self.points(frame, &bar)?.has_finite(MIN_POINTS) {
+                start = frame;
+                break;
+            }
+        }
+        let last = frames.end - 1 - start;
+        let count = (last + 1).min(MAX_CAMERA_FRAMES);
+        let mut looks: Vec<usize> = (0..count).map(|look| start + last * look / (count - 1).max(1)).collect();
         looks.dedup();
         let mut clouds = Vec::new();
         for (number, frame) in looks.iter().enumerate() {
@@ -172,10 +180,11 @@ impl Moving {
         drop(bar);
         let parts: Vec<_> = clouds.iter().map(|cloud| (&**cloud, DMat4::IDENTITY)).collect();
         let all = PointCloud::merged(&parts);
-        if all.len() < 2 {
+        if !all.has_finite(MIN_POINTS) {
             return Err(Failure::new(Exit::Input, format!("{}: there are no points in these frames", self.names)));
         }
-        let first = clouds.into_iter().find(|cloud| cloud.len() > 1).unwrap_or_else(|| Arc::new(all.clone()));
+        let first =
+            clouds.into_iter().find(|cloud| cloud.has_finite(MIN_POINTS)).unwrap_or_else(|| Arc::new(all.clone()));
         self.place.settle(job, renderer, &all, first)
     }
 

@@ -88,6 +88,28 @@ fn a_folder_alone_is_its_first_frame() {
 }
 
 #[test]
+fn frames_without_points_come_before_the_first() {
+    let folder = folder();
+    for name in ["sweep/scan_0.xyz", "sweep/scan_1.xyz"] {
+        folder.write(name, "nan nan nan\nnan nan nan\n");
+    }
+    let out = folder.succeed(&["render", "sweep", "--size", "120x90", "-o", "first.png"]);
+    assert!(out.stderr.contains("sweep: this is frame 2 of 0 to 3, the first with points"), "{}", out.stderr);
+    folder.succeed(&["render", "sweep/scan_2.xyz", "--size", "120x90", "--quiet", "-o", "file.png"]);
+    assert_eq!(folder.read("first.png"), folder.read("file.png"), "the same as the file");
+    let out = folder.succeed(&["render", "sweep", "--size", "120x90", "-o", "f_%d.png"]);
+    assert!(out.stderr.contains("2 frames show nothing, the first is frame 0"), "{}", out.stderr);
+    let told = folder.succeed(&["info", "sweep"]).stdout;
+    assert!(told.contains("frame 2 of 0 to 3, the first with points") && told.contains("900"), "{told}");
+    let Some(field) = crate::common::data().map(|data| data.with_file_name("field")) else { return };
+    let bag = field.join("bag_b06_empty_then_full.bag").display().to_string();
+    let out = folder.succeed(&["convert", &bag, "bag.ply"]);
+    assert!(out.stderr.contains("this is frame 1 of 0 to 1, the first with points"), "{}", out.stderr);
+    let out = folder.succeed(&["render", &bag, "--frames", "0..", "--size", "120x90", "-o", "g_%d.jpg"]);
+    assert!(folder.path("g_1.jpg").exists() && out.stderr.contains("frame 0 shows nothing"), "{}", out.stderr);
+}
+
+#[test]
 fn an_unreadable_frame_is_reported_and_skipped() {
     let folder = folder();
     folder.write("sweep/scan_2.xyz", "this is no cloud\n");

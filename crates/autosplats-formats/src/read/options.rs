@@ -46,7 +46,7 @@ pub struct ReadOptions {
 ///
 /// // A PGM image of 2x2 pixels, each of them 1000 mm.
 /// let image = [b"P5 2 2 65535\n".to_vec(), 1000_u16.to_be_bytes().repeat(4)].concat();
-/// let camera = DepthCamera { fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.5, scale: 1000.0 };
+/// let camera = DepthCamera { fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.5, scale: Some(1000.0) };
 /// let options = ReadOptions { depth_camera: Some(camera), ..ReadOptions::default() };
 /// let cloud = read_bytes("depth.pgm".as_ref(), &image, &options, &())?;
 /// assert_eq!(cloud.world_position(0), DVec3::new(-0.5, -0.5, 1.0));
@@ -62,6 +62,7 @@ pub struct DepthCamera {
     pub cx: f64,
     /// Principal point along a column, in pixels from the centre of the first pixel.
     pub cy: f64,
-    /// Pixel values per metre: 1000 for millimetres.
-    pub scale: f64,
+    /// Pixel values per metre: 1000 for millimetres. `None` takes whole numbers as millimetres, and floats as metres
+    /// unless all are whole and large.
+    pub scale: Option<f64>,
 }

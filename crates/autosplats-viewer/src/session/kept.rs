@@ -185,7 +185,7 @@ mod tests {
 
     /// An input with all values set.
     fn told() -> Input {
-        let depth_camera = Some(DepthCamera { fx: 525.0, fy: 525.5, cx: 319.5, cy: 239.5, scale: 5000.0 });
+        let depth_camera = Some(DepthCamera { fx: 525.0, fy: 525.5, cx: 319.5, cy: 239.5, scale: Some(5000.0) });
         let columns = Some(vec!["x".into(), "-".into(), "y".into()]);
         let options = ReadOptions { columns, depth_camera, keep_no_returns: true, ..ReadOptions::default() };
         let latest = LatestOptions { decay: Some(Duration::from_millis(250)), ..LatestOptions::default() };

@@ -2,14 +2,14 @@
 //!
 //! # How it works
 //! The render thread is asked for one picture at a time, so that the window stays usable. A thread of its own writes
-//! the pictures as PNG files, or sends them to ffmpeg for a film. Everything stays as at the start of the film, except
+//! the pictures as files, or sends them to ffmpeg for a film. Everything stays as at the start of the film, except
 //! the camera and, where time runs, the points that a [`Reel`] reads.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use autosplats::{Camera, Image};
-use autosplats_output::{Film, Frames, Target, write_png};
+use autosplats_output::{Film, Frames, Target, write_picture};
 use eframe::egui;
 
 use crate::files;
@@ -147,7 +147,7 @@ fn write_frames(
     let mut count = 0;
     for image in queue {
         let path = frames.file(count);
-        files::write(&path, |writer| write_png(&image, true, writer))
+        files::write(&path, |writer| write_picture(&image, frames.format(), true, writer))
             .map_err(|error| format!("{}: {error}", path.display()))?;
         count += 1;
         context.request_repaint();

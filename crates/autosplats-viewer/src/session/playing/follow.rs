@@ -163,7 +163,7 @@ impl Session {
             // These points were requested before the edit.
             Some(id) if self.history.is_unsaved(id) => return,
             Some(id) => self.fill(id, cloud),
-            None if cloud.is_empty() => return,
+            None if !cloud.has_finite(1) => return,
             None => {
                 let known = || FirstLook::of(&moving.input, cloud, self.loader.frame.get());
                 let glance = glance.unwrap_or_else(known);

@@ -207,7 +207,7 @@ fn run(
                 next => next?,
             },
         };
-        let first = cloud.as_ref().filter(|cloud| !cloud.is_empty() && !shared.lock().begun);
+        let first = cloud.as_ref().filter(|cloud| cloud.has_finite(1) && !shared.lock().begun);
         let glance = first.map(|cloud| FirstLook::of(input, cloud, view.get()));
         let mut post = shared.lock();
         let news = cloud.filter(|_| wanted.is_some() || !post.paused || !post.begun);
@@ -215,7 +215,7 @@ fn run(
         let changed = news.is_some() || statistics != post.statistics;
         post.statistics = statistics;
         if let Some(cloud) = news {
-            post.begun |= !cloud.is_empty();
+            post.begun |= cloud.has_finite(1);
             if glance.is_some() {
                 post.news.glance = glance;
             }
