@@ -42,13 +42,13 @@ pub use error::{Error, excerpt, one_line};
 pub use error_kind::ErrorKind;
 pub use files::{Bytes, temporary_beside, write_whole};
 pub use filter::{LeftOut, PointFilter};
-pub use geographic::LocalMetres;
+pub use geographic::{LocalMetres, looks_like_degrees};
 /// Vector library of the public interface.
 pub use glam;
 pub use guard::guard;
 pub use memory::{available_memory, check_memory};
 pub use merge::normal_matrix;
-pub use precision::{residual, sampled_middle, storage_origin};
+pub use precision::{degree_origin, residual, sampled_bounds, sampled_middle, storage_origin};
 pub use progress::{Part, Progress};
 pub use random::Random;
 pub use sample::{SurfaceSamples, sample_surface};

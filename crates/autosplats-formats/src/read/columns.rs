@@ -111,6 +111,11 @@ pub(super) fn is_longitude(name: &str) -> bool {
     ["longitude", "lon", "long", "lng"].contains(&&*plain(name))
 }
 
+/// Whether a name is one of latitude.
+pub(super) fn is_latitude(name: &str) -> bool {
+    ["latitude", "lat"].contains(&&*plain(name))
+}
+
 /// Names of the three channels of a colour. If a file has several colours, the first in this list is taken.
 const COLORS: [[&str; 3]; 5] = [
     ["red", "green", "blue"],

@@ -35,6 +35,7 @@ mod sensor;
 mod stl;
 pub mod table;
 mod text;
+mod units;
 mod xyz;
 
 use self::job::{Format, Job, MAX_HEADER_LINE};

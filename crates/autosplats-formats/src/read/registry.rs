@@ -11,7 +11,7 @@ use super::{
     job::{Format, Job},
     las, obj, off,
     options::ReadOptions,
-    pcd, ply, ptx, raw, sensor, stl, xyz,
+    pcd, ply, ptx, raw, sensor, stl, units, xyz,
 };
 
 /// All formats, in order of precedence: by content first, then by extension. Longer extensions precede shorter ones.
@@ -224,7 +224,9 @@ pub fn describe(path: &Path, options: &ReadOptions) -> Result<Description, Error
 /// ```
 pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Description, Error> {
     let job = Job { path: name, progress: &(), bytes, options, triangles: false };
-    (format(&job)?.describe)(&job)
+    let mut description = (format(&job)?.describe)(&job)?;
+    units::settle_description(&mut description);
+    Ok(description)
 }
 
 /// Fails if the bytes of a file are a Git LFS pointer instead of the data.
@@ -271,6 +273,7 @@ fn contents(job: &Job<'_>) -> Result<(Contents, LeftOut), Error> {
     let previews = choose::ChosenPreviews::new(job, format);
     let progress = previews.as_ref().map_or(job.progress, |previews| previews as &dyn Progress);
     let mut contents = (format.read)(&Job { progress, ..*job })?;
+    units::settle(job, &mut contents.cloud)?;
     let model = MODELS.iter().any(|model| model.name == format.name) || ply::is_mesh(job);
     // Dropping points would remove corners of a mesh.
     if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {

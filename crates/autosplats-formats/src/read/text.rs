@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::{
     Job,
+    columns::{is_latitude, is_longitude},
     table::{CHUNK, ProgressRange, Scalar, reserve},
 };
 
@@ -19,7 +20,7 @@ pub(super) const TEXT: &str = "text";
 
 /// Whether a value is a coordinate, which keeps all its digits.
 pub(super) fn is_coordinate(name: &str) -> bool {
-    ["x", "y", "z"].contains(&&*name.to_ascii_lowercase())
+    ["x", "y", "z"].contains(&&*name.to_ascii_lowercase()) || is_longitude(name) || is_latitude(name)
 }
 
 /// What to do with the next value of a row.

@@ -3,11 +3,16 @@
 //! The text is cut into pieces at line ends. The pieces are parsed in parallel, each into columns of its own, which are
 //! appended to the cloud's columns in order. Besides the cloud, only one batch of pieces is in memory.
 
-use autosplats_cloud::{Error, FieldValues, PointCloud, excerpt, residual, storage_origin};
+use autosplats_cloud::{Crs, Error, FieldValues, PointCloud, Unit, degree_origin, excerpt, residual, storage_origin};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::{Job, table::reserve, text};
+use super::super::{
+    Job,
+    table::reserve,
+    text,
+    units::{LOOKS_LIKE_DEGREES, look_like_degrees},
+};
 use super::{
     cells::{Separator, is_missing, trimmed},
     layout::{Layout, Target},
@@ -32,7 +37,7 @@ const PLACES: usize = 1024;
 /// Reads the rows from byte `start` on.
 pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Option<usize>) -> Result<PointCloud, Error> {
     let text = job.bytes;
-    let (origin, row_len) = survey(job, layout, start);
+    let Survey { origin, crs, row_len } = survey(job, layout, start);
     job.check_memory((text.len() - start) / row_len, layout.bytes_per_point(job.options.exact))?;
     let parser = Parser { layout, origin, exact: job.options.exact, counts_between: promised.is_some() };
     let mut all = Columns::new(layout);
@@ -61,7 +66,7 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
     }
     check_promise(job, all.positions.len(), promised, counts_between)?;
     job.tick(PARSING)?;
-    all.into_cloud(layout, origin, job.options.exact)
+    Ok(all.into_cloud(layout, origin, job.options.exact)?.with_crs(crs))
 }
 
 /// Compares the number of rows with the stated counts.
@@ -80,8 +85,16 @@ fn check_promise(job: &Job<'_>, rows: usize, first: Option<usize>, between: usiz
     Ok(())
 }
 
-/// An origin for the points and the mean length of a row in bytes, from rows sampled all over the text.
-fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
+/// What rows sampled all over the text tell.
+struct Survey {
+    /// An origin for the points.
+    origin: DVec3,
+    crs: Crs,
+    /// Mean length of a row in bytes.
+    row_len: usize,
+}
+
+fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> Survey {
     let text = job.bytes;
     let mut points = Vec::new();
     let (mut last, mut bytes) = (None, 0);
@@ -110,9 +123,18 @@ fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
             points.push(DVec3::from(point));
         }
     }
-    let origin = storage_origin(points.len(), |i| points[i]);
+    let mut crs = layout.crs.clone();
+    if crs == Crs::default() && job.options.columns.is_none() && look_like_degrees(points.len(), |i| points[i]) {
+        crs.unit = Some(Unit::Degree);
+        job.note(LOOKS_LIKE_DEGREES);
+    }
+    let origin = if crs.unit == Some(Unit::Degree) {
+        degree_origin(points.len(), |i| points[i])
+    } else {
+        storage_origin(points.len(), |i| points[i])
+    };
     // The shortest row has three digits, each followed by a byte.
-    (origin, bytes.checked_div(points.len()).unwrap_or(0).max(6))
+    Survey { origin, crs, row_len: bytes.checked_div(points.len()).unwrap_or(0).max(6) }
 }
 
 impl Layout {
@@ -197,7 +219,6 @@ impl Columns {
             };
             cloud = cloud.with_field(name, values)?;
         }
-        cloud = cloud.with_crs(layout.crs.clone());
         Ok(cloud)
     }
 }
