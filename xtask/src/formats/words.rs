@@ -18,6 +18,9 @@ All readers:
   `GpsTime`, `NormalX` …), else the file's.
 - Points at exactly (0, 0, 0), which scanners write for missing returns, are dropped and counted. Points without a
   finite position are kept in the cloud and left out of pictures.
+- `--keep` chooses points by class, flag and return. Pictures leave out noise (classes 7 and 18) and withheld points;
+  written files and `info` keep them. In formats other than LAS this holds for a field called `Classification`; a `label`
+  7 may be anything, so it stays unless `--keep` says otherwise.
 - Notes on standard error, and the `warnings` of `info`, state what is lost, guessed, dropped or scaled.
 - A header's counts are compared with the file's size before memory is allocated. A broken file gives a message of one
   line: the file, the position, what is wrong and the remedy.

@@ -19,7 +19,7 @@ const BLOCK: usize = 1 << 16;
 /// | word | points |
 /// |---|---|
 /// | `all` | all |
-/// | `usual` | all but those of the classes for noise (7 and 18) and withheld ones |
+/// | `usual` | all but withheld ones and those of the classes for noise, a `Classification` of 7 or 18 |
 /// | `6`, `2..5` | of this class, of these classes |
 /// | `ground`, `building`, `water` … | of the ASPRS class of this name |
 /// | `noise`, `vegetation`, `wire` | of classes 7 and 18; 3, 4 and 5; 13 and 14 |
@@ -30,7 +30,7 @@ const BLOCK: usize = 1 << 16;
 /// A hyphen before a word leaves its points out. Of the words without a hyphen, a kept point matches one for classes,
 /// one for flags and one for returns, as far as there are such words. `all` and `usual` stand alone.
 ///
-/// Classes are in a field called `Classification`, `class` or `label`; flags and returns are in fields with the names
+/// Of other words, classes are in a field called `Classification`, `class` or `label`; flags and returns are in fields with the names
 /// of PDAL: `Withheld`, `ReturnNumber` … Letter case and separators do not matter.
 ///
 /// # Examples

@@ -114,5 +114,9 @@ fn fields_have_several_names_and_types() {
     assert_eq!(missing("last"), Some("ReturnNumber"));
     assert_eq!((missing("usual"), missing("all")), (None, None), "nothing is needed");
     assert_eq!(ground.left_out(&cloud).count(), 3, "the class is 0");
+    for (name, noise) in [("scalar_Classification", 3), ("class", 0), ("label", 0)] {
+        let cloud = with(name, FieldValues::U8(vec![7; 3])).expect("a value each");
+        assert_eq!(PointFilter::usual().left_out(&cloud).count(), noise, "{name}");
+    }
     assert_eq!("0,-withheld".parse::<PointFilter>().expect("a filter").left_out(&cloud).count(), 0, "the class is 0");
 }

@@ -53,8 +53,12 @@ impl FromStr for PointFilter {
 
 /// The terms of the usual filter.
 pub(super) fn usual() -> Vec<Term> {
-    let terms = NOISE.iter().map(|&class| self::class(class)).chain([flag("withheld", "Withheld")]);
-    terms.map(|term| Term { excludes: true, ..term }).collect()
+    // A label 7 may be anything, but not a `Classification` of 7.
+    let noise = NOISE.iter().map(|&number| {
+        let tests = vec![Test::Within(Column::Named("Classification"), [number.into(); 2])];
+        Term { tests, ..class(number) }
+    });
+    noise.chain([flag("withheld", "Withheld")]).map(|term| Term { excludes: true, ..term }).collect()
 }
 
 /// The terms of one word without its hyphen.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use autosplats_cloud::{Contents, Error, LeftOut, PointCloud, PointFilter, Progress, class_name};
 
 use super::{
-    columns::{field_name, plain},
+    columns::plain,
     job::{Format, Job},
     las,
 };
@@ -53,7 +53,9 @@ pub(super) fn left_out(job: &Job<'_>, format: &Format, cloud: &PointCloud) -> Re
 /// this takes the name that LAS, PDAL and CloudCompare use: `Classification`, not `class` or `label`.
 fn has_standard_classes(job: &Job<'_>, format: &Format) -> bool {
     let described = (format.describe)(&Job { progress: &(), ..*job });
-    let standard = |name: &str| plain(name).ends_with("classification") && field_name(name) == "Classification";
+    // E57 writes the name of an extension before the names of its fields.
+    let own = |name: &str| plain(name.rsplit(':').next().unwrap_or_default());
+    let standard = |name: &str| ["classification", "scalarclassification"].contains(&&*own(name));
     described.is_ok_and(|facts| facts.attributes.iter().any(|attribute| standard(&attribute.name)))
 }
 

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
+mod choosing;
 mod common;
 mod depth_images;
 mod e57;

@@ -14,6 +14,7 @@ use super::frames::Frames;
 use crate::{
     Timeline,
     listing::{candidates, is_named_as_cloud},
+    source::or_empty,
 };
 
 /// Files, one per frame.
@@ -53,11 +54,8 @@ impl Frames for Sequence {
     }
 
     fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
-        match read_with(&self.files[frame], &self.options, progress) {
-            // An object may leave the scene, and its frames are then empty.
-            Err(Error::NothingKept { .. }) => Ok(vec![Arc::default()]),
-            cloud => Ok(vec![Arc::new(cloud?)]),
-        }
+        let cloud = or_empty(read_with(&self.files[frame], &self.options, progress))?;
+        Ok(vec![Arc::new(cloud)])
     }
 
     fn surface(&self, frame: usize, progress: &dyn Progress) -> Result<Surface, Error> {

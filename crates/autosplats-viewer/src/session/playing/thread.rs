@@ -4,11 +4,11 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use autosplats::cloud::{Error, PointCloud, Progress};
-use autosplats_formats::ReadOptions;
 use autosplats_sources::{Statistics, Timeline};
 use eframe::egui;
 
-use crate::session::{FirstLook, Input, SharedViewFrame};
+use crate::session::document::Bits;
+use crate::session::{FirstLook, Input, SharedViewFrame, read_options};
 
 /// Longest silence of a live stream before the thread checks whether the stream is still wanted.
 const SILENCE_LIMIT: Duration = Duration::from_millis(100);
@@ -176,8 +176,7 @@ fn run(
     context: &egui::Context,
 ) -> Result<(), Error> {
     let follower = Follower { shared, context };
-    let options = ReadOptions { exact: true, ..input.options.clone() };
-    let mut player = input.source.play(&input.play, &options, &follower)?;
+    let mut player = input.source.play(&input.play, &read_options(input), &follower)?;
     let timeline = player.stream().timeline().cloned().map(Arc::new);
     {
         let mut post = shared.lock();
@@ -208,7 +207,7 @@ fn run(
             },
         };
         let first = cloud.as_ref().filter(|cloud| cloud.has_finite(1) && !shared.lock().begun);
-        let glance = first.map(|cloud| FirstLook::of(input, cloud, view.get()));
+        let glance = first.map(|cloud| FirstLook::of(input, cloud, &Bits::default(), view.get()));
         let mut post = shared.lock();
         let news = cloud.filter(|_| wanted.is_some() || !post.paused || !post.begun);
         let statistics = player.stream().statistics();
