@@ -44,7 +44,7 @@ pub use glam;
 pub use guard::guard;
 pub use memory::{available_memory, check_memory};
 pub use merge::normal_matrix;
-pub use precision::{residual, sampled_middle, storage_origin};
+pub use precision::{RelativeValues, ValueOrigin, residual, sampled_middle, storage_origin};
 pub use progress::{Part, Progress};
 pub use random::Random;
 pub use sample::{SurfaceSamples, sample_surface};

@@ -82,9 +82,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
 
     columns.remove(&damaged);
     let (cloud, narrow) = columns.into_cloud()?;
-    if narrow {
-        notes.push("no colour value exceeds 255; the 16-bit colours are read as 8 bits".into());
-    }
+    notes.extend(narrow);
     let claimed = header.points;
     if lost > 0 {
         notes.push(format!("the file is cut off: {lost} of {claimed} points are lost; copy it again"));
