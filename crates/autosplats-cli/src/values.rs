@@ -220,9 +220,9 @@ pub(crate) fn above_zero(text: &str) -> Result<f64, String> {
 }
 
 /// Parses a range, such as `-2..10` or `-2,10`.
-pub(crate) fn range(text: &str) -> Result<[f32; 2], String> {
+pub(crate) fn range(text: &str) -> Result<[f64; 2], String> {
     let ends = text.split_once("..").or_else(|| text.split_once(','));
-    match ends.and_then(|(low, high)| Some([number::<f32>(low)?, number::<f32>(high)?])) {
+    match ends.and_then(|(low, high)| Some([number::<f64>(low)?, number::<f64>(high)?])) {
         Some([low, high]) if low < high => Ok([low, high]),
         Some(_) => Err("the first number must be the lower one".into()),
         None => Err("must be two numbers, such as 0..2.5 or -1,1".into()),

@@ -48,7 +48,9 @@ pub use glam;
 pub use guard::guard;
 pub use memory::{available_memory, check_memory};
 pub use merge::normal_matrix;
-pub use precision::{degree_origin, residual, sampled_bounds, sampled_middle, storage_origin};
+pub use precision::{
+    RelativeValues, ValueOrigin, degree_origin, residual, sampled_bounds, sampled_middle, storage_origin,
+};
 pub use progress::{Part, Progress};
 pub use random::Random;
 pub use sample::{SurfaceSamples, sample_surface};

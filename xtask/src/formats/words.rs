@@ -46,12 +46,13 @@ pub(super) const FORMAT_TEXTS: &[FormatText] = &[
     },
     FormatText {
         name: "PLY",
-        kept: "text and binary in both byte orders; all scalar properties of `vertex`, colours; faces for `convert --sample`",
-        not_kept: "list properties of points, other elements",
+        kept: "text and binary in both byte orders; all scalar properties of `vertex`, colours, also packed in `rgba` or as base \
+               colours of 3D Gaussian splats; faces for `convert --sample`",
+        not_kept: "list properties of points, other elements; compressed 3D Gaussian splats are refused",
     },
     FormatText {
         name: "PCD",
-        kept: "text, binary and compressed; fields of up to 16 values, colours packed in `rgb` or `rgba` or separate, the \
+        kept: "text, binary and compressed, from version 0.5 on; fields of up to 16 values, colours packed in `rgb` or `rgba` or separate, the \
                viewpoint as sensor position, or the origin for organised clouds whose rays meet there",
         not_kept: "the grid of organised clouds",
     },
@@ -74,8 +75,8 @@ pub(super) const FORMAT_TEXTS: &[FormatText] = &[
     },
     FormatText {
         name: "bare floats",
-        kept: "little-endian 32-bit floats without a header: x y z and intensity (KITTI), ring (nuScenes); others are stated \
-               by `--columns`",
+        kept: "little-endian 32-bit floats without a header: x y z and up to five more, such as intensity (KITTI) and ring \
+               (nuScenes). The numbers tell how many a point has; where they do not, `--columns` has to",
         not_kept: "",
     },
     FormatText {

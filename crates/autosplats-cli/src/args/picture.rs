@@ -146,7 +146,7 @@ pub(crate) struct LookArgs {
     pub(crate) color: ColorMode,
     /// Values at both ends of the colour map [default: 1st and 99th percentile of the picture]
     #[arg(long, value_name = "A..B", value_parser = values::range, allow_hyphen_values = true)]
-    pub(crate) range: Option<[f32; 2]>,
+    pub(crate) range: Option<[f64; 2]>,
     /// Colour map of scalar values [default: reds for radii, gray for intensity, otherwise viridis]
     #[arg(long, value_enum)]
     pub(crate) color_map: Option<Map>,

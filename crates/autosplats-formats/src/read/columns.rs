@@ -2,7 +2,7 @@
 
 use autosplats_cloud::{Error, excerpt};
 
-use super::Job;
+use super::{Attribute, Job};
 
 /// Largest number of values of a point; a header with more is broken.
 pub const MAX_COLUMNS: usize = 1024;
@@ -114,6 +114,18 @@ pub(super) fn is_longitude(name: &str) -> bool {
 /// Whether a name is one of latitude.
 pub(super) fn is_latitude(name: &str) -> bool {
     ["latitude", "lat"].contains(&&*plain(name))
+}
+
+/// Attributes whose names differ: an underscore is added to each that comes again, as to the fields of a cloud.
+pub(super) fn unrepeated(attributes: impl Iterator<Item = Attribute>) -> Vec<Attribute> {
+    let mut all: Vec<Attribute> = Vec::new();
+    for mut attribute in attributes.take(MAX_COLUMNS) {
+        while all.iter().any(|other| other.name == attribute.name) {
+            attribute.name.push('_');
+        }
+        all.push(attribute);
+    }
+    all
 }
 
 /// Names of the three channels of a colour. If a file has several colours, the first in this list is taken.

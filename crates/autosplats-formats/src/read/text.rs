@@ -37,6 +37,18 @@ pub(super) enum Token {
 }
 
 impl Token {
+    /// How to store a value of this name and declared type, and in which type: coordinates keep all their digits, and
+    /// packed colours their bits.
+    pub(super) fn of(name: &str, scalar: Scalar) -> (Scalar, Self) {
+        if is_coordinate(name) {
+            (Scalar::F64, Self::Store(Scalar::F64))
+        } else if is_packed_color(name, scalar) {
+            (Scalar::U32, Self::Packed)
+        } else {
+            (scalar, Self::Store(scalar))
+        }
+    }
+
     /// Bytes of the value in the record.
     pub(super) fn size(self) -> usize {
         match self {
@@ -52,8 +64,8 @@ pub(super) struct Rows<'a> {
     pub(super) tokens: &'a [Token],
     /// Number of rows to read; `None` reads to the end of the file.
     pub(super) count: Option<usize>,
-    /// Whether lines of a single integer are counts, not rows.
-    pub(super) counts_between: bool,
+    /// Whether the text may end before all rows, which is told.
+    pub(super) may_be_cut: bool,
 }
 
 /// Result of parsing one piece of text.
@@ -83,6 +95,7 @@ impl Rows<'_> {
         let wanted = self.count.unwrap_or(usize::MAX);
         let mut records = Vec::new();
         let (mut rows, mut shown) = (0, 0);
+        let mut complete_last = true;
         let mut at = start;
         while at < text.len() && rows < wanted {
             job.tick(part.start + part.len * (at - start) as f32 / (text.len() - start) as f32)?;
@@ -103,6 +116,11 @@ impl Rows<'_> {
                     break;
                 }
                 if let Some((offset, what)) = piece.error {
+                    // An unfinished last line.
+                    if self.may_be_cut && rows > 0 && line_end(text, offset) == text.len() {
+                        complete_last = false;
+                        break;
+                    }
                     return Err(job.malformed(job.line(offset), what));
                 }
             }
@@ -112,10 +130,20 @@ impl Rows<'_> {
             }
         }
         if self.count.is_some() && rows < wanted {
-            return Err(job.malformed(
-                job.line(text.len()),
-                format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
-            ));
+            if self.may_be_cut {
+                if !text.ends_with(b"\n") && complete_last {
+                    // Digits of the last value may be missing.
+                    rows = rows.saturating_sub(1);
+                    records.truncate(rows * len);
+                    shown = shown.min(rows);
+                }
+                job.tell_cut_off(rows, wanted, "points")?;
+            } else {
+                return Err(job.malformed(
+                    job.line(text.len()),
+                    format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
+                ));
+            }
         }
         show(&records[shown * len..], rows - shown)?;
         Ok((records, rows))
@@ -131,7 +159,7 @@ impl Rows<'_> {
         while at < text.len() {
             let end = line_end(text, at);
             let line = text[at..end].trim_ascii();
-            if !(is_blank(line) || self.counts_between && is_count(line)) {
+            if !is_blank(line) {
                 let len = piece.records.len();
                 if let Err(what) = self.parse_row(line, &mut piece.records) {
                     piece.records.truncate(len);
@@ -198,15 +226,12 @@ fn store(scalar: Scalar, value: &[u8], record: &mut Vec<u8>) -> Result<(), Strin
     Ok(())
 }
 
-/// Decodes a packed colour: an integer, a float whose bits are the colour, or, in old files, a float whose value is the
-/// colour. Such values are whole numbers, which floats of colour bits never are.
+/// Decodes a packed colour: an integer, or, with a point or an exponent, a float whose bits are the colour.
 fn packed(value: &[u8]) -> Result<u32, String> {
-    if let Some(integer) = std::str::from_utf8(value).ok().and_then(|text| text.parse::<i64>().ok()) {
-        return Ok(integer as u32);
+    match std::str::from_utf8(value).ok().and_then(|text| text.parse::<i64>().ok()) {
+        Some(integer) => Ok(integer as u32),
+        None => Ok((number(value)? as f32).to_bits()),
     }
-    let number = number(value)?;
-    let whole = number.fract() == 0.0 && (1.0..16_777_216.0).contains(&number);
-    Ok(if whole { number as u32 } else { (number as f32).to_bits() })
 }
 
 /// A number, including `nan` and `inf` in any letter case.
@@ -224,6 +249,11 @@ pub(super) fn number(value: &[u8]) -> Result<f64, String> {
 /// The values of a line, separated by blanks, commas or semicolons.
 pub(super) fn values(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|byte| matches!(byte, b' ' | b'\t' | b',' | b';' | b'\r')).filter(|value| !value.is_empty())
+}
+
+/// Whether a value is a colour packed into 32 bits.
+pub(super) fn is_packed_color(name: &str, scalar: Scalar) -> bool {
+    scalar.size() == 4 && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase())
 }
 
 /// Whether a trimmed line is empty or a comment.

@@ -13,6 +13,7 @@ mod las;
 mod las_writing;
 mod losses;
 mod meshes;
+mod oddities;
 mod progress;
 mod ptx;
 mod real_files;

@@ -110,7 +110,7 @@ impl Recording {
         self.asked = false;
         if self.next == 1 {
             // All pictures keep the range of the first one.
-            let range = range.map(|ends| ends.map(|end| end as f32)).filter(|[low, high]| low < high);
+            let range = range.filter(|[low, high]| low < high);
             let known = &mut self.wish.settings.shading.range;
             *known = known.or(range);
         }

@@ -296,8 +296,9 @@ impl CpuFrame<'_> {
         let CpuRenderer { upward, exposure, splatter, image, last_picture, .. } = &mut *self.renderer;
         let Self { cloud, settings: Settings { shading, all_layers, .. }, .. } = self;
         let exposure = exposure.of(cloud, shading);
-        let scene = Scene { view: &self.picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let layers = splatter.last();
+        let values = layers.scalar_about;
+        let scene = Scene { view: &self.picture, up: upward.of(cloud), origin: cloud.origin(), exposure, values };
         let mut following = self.rules.averaged.map(|_| last_picture.following(self.picture));
         let mut average = following.as_mut().map(|following| |image: &mut Image| following.average(layers, image));
         let average = average.as_mut().map(|average| average as &mut dyn FnMut(&mut Image));

@@ -239,7 +239,8 @@ impl GpuRenderer {
         } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let exposure = exposure.of(cloud, &settings.shading);
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
+        let values = wanted.scalar(cloud).map(|values| values.about()).unwrap_or_default();
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure, values };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (PlacedView { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
         prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform);
@@ -267,6 +268,7 @@ impl GpuRenderer {
                 [_, _, _, surface, cover, extras] => prepared.layers.to_host(screen.margin, surface, cover, extras),
                 _ => GBuffer::default(),
             };
+            layers.scalar_about = values;
             (counters, value_range)
         })?;
         let waited_ms = waited.elapsed().as_secs_f64() * 1e3;
@@ -319,7 +321,8 @@ impl GpuRenderer {
         let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let exposure = exposure.of(cloud, &settings.shading);
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
+        let values = wanted.scalar(cloud).map(|values| values.about()).unwrap_or_default();
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure, values };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (PlacedView { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
         prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform.into_format(texture.format()));

@@ -53,7 +53,7 @@ impl Counts {
     /// The ends of the colour map in this picture, as [`Shading::range`](crate::Shading::range) takes them for others.
     /// `None` without values, or if all are the same.
     #[must_use]
-    pub fn range(&self) -> Option<[f32; 2]> {
-        self.value_range.map(|ends| ends.map(|end| end as f32)).filter(|[low, high]| low < high)
+    pub fn range(&self) -> Option<[f64; 2]> {
+        self.value_range.filter(|[low, high]| low < high)
     }
 }

@@ -26,7 +26,7 @@ pub(super) const LIBRARY: Library = Library {
     constants: &[
         Counter::CONSTANTS,
         ShownQuantity::CONSTANTS,
-        constants!(in cpu: BACK_COLOR, BACK_LIGHT),
+        constants!(in cpu: BACK_COLOR, BACK_LIGHT, RANGE_NOISE),
         constants!(in edges: EDGE_SEARCH_PX, INNER_NORMAL_PX, MIN_TILT_LOSS),
         constants!(in light: CLAY, FILL_LIGHT, GROUND, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY),
         constants!(in occlusion: FARTHEST_RISE, MAX_FULL_RISE, MIN_RISE, PAIR_COUNT),

@@ -34,7 +34,7 @@ pub struct Shading {
     /// Source of the surface's colour.
     pub color: ColorMode,
     /// World values at the two ends of the colour map; `None` takes the 1st and 99th percentile of the picture.
-    pub range: Option<[f32; 2]>,
+    pub range: Option<[f64; 2]>,
     /// Colour map for values; `None` takes the usual one of the colour mode.
     pub color_map: Option<ColorMap>,
     /// Draw the colour map with its range into the picture, if the colour mode has one.

@@ -54,7 +54,7 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
         job.preview(|| {
             let mut chunk = Columns::new(layout);
             pieces.iter().try_for_each(|piece| chunk.append(&piece.columns))?;
-            chunk.into_cloud(layout, origin, false)
+            chunk.into_cloud(&Job { progress: &(), ..*job }, layout, origin, false)
         })?;
         for piece in pieces {
             if let Some((offset, what)) = piece.error {
@@ -66,7 +66,7 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
     }
     check_promise(job, all.positions.len(), promised, counts_between)?;
     job.tick(PARSING)?;
-    Ok(all.into_cloud(layout, origin, job.options.exact)?.with_crs(crs))
+    Ok(all.into_cloud(job, layout, origin, job.options.exact)?.with_crs(crs))
 }
 
 /// Compares the number of rows with the stated counts.
@@ -199,7 +199,7 @@ impl Columns {
         Ok(())
     }
 
-    fn into_cloud(self, layout: &Layout, origin: DVec3, exact: bool) -> Result<PointCloud, Error> {
+    fn into_cloud(self, job: &Job<'_>, layout: &Layout, origin: DVec3, exact: bool) -> Result<PointCloud, Error> {
         let mut positions = self.positions;
         positions.shrink_to_fit();
         let mut cloud = PointCloud::new(origin, positions);
@@ -207,7 +207,7 @@ impl Columns {
             cloud = cloud.with_residuals(self.residuals)?;
         }
         if layout.has_color {
-            cloud = with_colors(cloud, self.colors, exact)?;
+            cloud = with_colors(job, cloud, self.colors, exact)?;
         }
         for ((name, _), values) in layout.fields.iter().zip(self.fields) {
             let values = match values {
@@ -236,15 +236,15 @@ fn floats(bytes: &[[u8; 3]]) -> Result<Vec<[f32; 3]>, Error> {
     Ok(floats)
 }
 
-fn with_colors(cloud: PointCloud, colors: Colors, exact: bool) -> Result<PointCloud, Error> {
+fn with_colors(job: &Job<'_>, cloud: PointCloud, colors: Colors, exact: bool) -> Result<PointCloud, Error> {
     let floats = match colors {
         // If no value exceeds 1, the colours are rather floats that happen to be 0 or 1.
         Colors::Bytes(bytes) if bytes.par_iter().flatten().any(|&value| value > 1) => return cloud.with_colors(bytes),
         Colors::Bytes(bytes) => floats(&bytes)?,
         Colors::Floats(floats) => floats,
     };
-    let largest = floats.par_iter().flatten().copied().reduce(|| 0.0, f32::max);
-    let scale = ColorScale::of(largest.into(), true);
+    let scale = ColorScale::of(floats.len(), true, |i| floats[i].map(f64::from));
+    scale.note().iter().for_each(|note| job.note(note));
     let mut bytes = Vec::new();
     reserve(&mut bytes, floats.len(), "colours")?;
     bytes.par_extend(floats.par_iter().map(|color| color.map(|value| scale.byte(value.into()))));

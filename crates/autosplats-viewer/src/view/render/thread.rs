@@ -219,8 +219,7 @@ impl RenderState {
         if wish.budget_ms.is_none() && wish.dots.is_none() && still_supersample(wish.size) > 1 {
             settings.all_layers = selected.is_some();
             // The supersampled picture keeps the value range of this one.
-            settings.shading.range =
-                settings.shading.range.or(counts.value_range.map(|range| range.map(|end| end as f32)));
+            settings.shading.range = settings.shading.range.or(counts.range());
             *finer = Some(Finer { wish: wish.clone(), settings });
         }
         let depths = Depths::new(layers);

@@ -69,7 +69,7 @@ fn each_picture_shows_the_frame_of_its_time() {
         settings.reconstruction.k = settings.reconstruction.k.min(39);
         let rendered = renderer.render(&cloud, &app.view.navigation.camera(), [48, 32], &settings).expect("a picture");
         if let Some(range) = rendered.counts.value_range {
-            settings.shading.range.get_or_insert(range.map(|end| end as f32));
+            settings.shading.range.get_or_insert(range);
         }
         assert_eq!(picture.pixels, rendered.image.pixels, "picture {number} is of frame {frame}");
     }
