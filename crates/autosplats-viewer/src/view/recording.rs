@@ -105,12 +105,11 @@ impl Recording {
         Ok(Some(self.wish.clone()))
     }
 
-    /// Takes a finished picture and the value range of its colours.
-    pub(crate) fn arrived(&mut self, image: Image, range: Option<[f64; 2]>) {
+    /// Takes a finished picture and the ends of its colour map.
+    pub(crate) fn arrived(&mut self, image: Image, range: Option<[f32; 2]>) {
         self.asked = false;
         if self.next == 1 {
             // All pictures keep the range of the first one.
-            let range = range.map(|ends| ends.map(|end| end as f32)).filter(|[low, high]| low < high);
             let known = &mut self.wish.settings.shading.range;
             *known = known.or(range);
         }
@@ -222,7 +221,7 @@ mod tests {
             if let Some(wish) = recording.wanted().expect("nothing moves") {
                 ranges.push(wish.settings.shading.range);
                 let image = Image { width: 2, height: 1, pixels: vec![[1, 2, 3, 255]; 2], linear: Vec::new() };
-                recording.arrived(image, Some([ranges.len() as f64, 5.0]));
+                recording.arrived(image, Some([ranges.len() as f32, 5.0]));
             }
             if let Some(result) = recording.ended() {
                 break result;
