@@ -68,11 +68,7 @@ pub(crate) fn write_file(
     let _writing = interrupt.writing();
     write_whole(path, failed, |file| {
         let mut writer = BufWriter::with_capacity(1 << 18, Stoppable { file: file.get_mut(), interrupt });
-        let written = write(&mut writer).and_then(|()| writer.flush());
-        if interrupt.requested() {
-            return Err(Failure::interrupted());
-        }
-        written.map_err(failed)
+        write(&mut writer).and_then(|()| writer.flush()).map_err(failed)
     })?;
     metadata(path).map(|metadata| metadata.len()).map_err(failed)
 }
@@ -83,7 +79,6 @@ pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, console: &Console) ->
     let _writing = console.interrupt().writing();
     match autosplats_formats::write(cloud, path, &bar) {
         Ok(()) => metadata(path).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
-        Err(Error::Cancelled) => Err(Failure::interrupted()),
         Err(Error::Io { source, .. }) => Err(cannot_write(path, &source)),
         Err(error) => Err(Failure::new(Exit::Output, error)),
     }
