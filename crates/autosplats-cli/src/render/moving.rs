@@ -88,6 +88,7 @@ pub(super) fn run(
             let started = Instant::now();
             let cloud = scene.frame(frame, &notes)?;
             let read_ms = super::milliseconds_since(started);
+            job.fewer_neighbors(&cloud).iter().for_each(|note| notes.tell(note));
             let rendered = job.render(renderer, &cloud, &camera)?;
             tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
