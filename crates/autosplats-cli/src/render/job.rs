@@ -152,8 +152,8 @@ impl Job {
         cloud: &PointCloud,
         camera: &Camera,
     ) -> Result<Frame<'a>, Failure> {
-        let go_on = || !self.console.interrupt().requested();
-        Ok(renderer.render_while(cloud, camera, self.rendered_size(), &self.settings_for(cloud), &go_on)?)
+        let (size, settings) = (self.rendered_size(), self.settings_for(cloud));
+        Ok(renderer.render_while(cloud, camera, size, &settings, &self.console.goes_on())?)
     }
 
     /// Fixes what all pictures share, by the first of them.
@@ -164,7 +164,7 @@ impl Job {
         camera: &Camera,
     ) -> Result<(), Failure> {
         let mut settings = self.settings_for(cloud);
-        renderer.settle(&mut settings, cloud, camera, self.rendered_size())?;
+        renderer.settle(&mut settings, cloud, camera, self.rendered_size(), &self.console.goes_on())?;
         self.settings.shading = settings.shading;
         Ok(())
     }
