@@ -64,31 +64,22 @@ pub(crate) fn write_file(
     console: &Console,
     write: impl FnOnce(&mut BufWriter<Stoppable<'_>>) -> std::io::Result<()>,
 ) -> Result<u64, Failure> {
-    // A symbolic link stays, and its target is replaced.
-    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let interrupt = console.interrupt();
     let failed = |error: std::io::Error| cannot_write(path, &error);
     let _writing = interrupt.writing();
-    write_whole(&target, failed, |file| {
+    write_whole(path, failed, |file| {
         let mut writer = BufWriter::with_capacity(1 << 18, Stoppable { file: file.get_mut(), interrupt });
-        let written = write(&mut writer).and_then(|()| writer.flush());
-        if interrupt.requested() {
-            return Err(Failure::interrupted());
-        }
-        written.map_err(failed)
+        write(&mut writer).and_then(|()| writer.flush()).map_err(failed)
     })?;
-    metadata(&target).map(|metadata| metadata.len()).map_err(failed)
+    metadata(path).map(|metadata| metadata.len()).map_err(failed)
 }
 
 /// Writes a cloud atomically in the format of the path's extension. Returns the file's size in bytes.
 pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, console: &Console) -> Result<u64, Failure> {
-    // A symbolic link stays, and its target is replaced.
-    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let bar = Bar::on_file("writing", path, console);
     let _writing = console.interrupt().writing();
-    match autosplats_formats::write(cloud, &target, &bar) {
-        Ok(()) => metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
-        Err(Error::Cancelled) => Err(Failure::interrupted()),
+    match autosplats_formats::write(cloud, path, &bar) {
+        Ok(()) => metadata(path).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
         Err(Error::Io { source, .. }) => Err(cannot_write(path, &source)),
         Err(error) => Err(Failure::new(Exit::Output, error)),
     }

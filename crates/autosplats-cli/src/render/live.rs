@@ -36,6 +36,7 @@ pub(super) fn run(
         return Err(Failure::usage(format!("--resume: {name} is live, and its earlier frames do not come again")));
     }
     let bar = Bar::spinner("rendering live input", &job.console);
+    let notes = Notes::new(&bar, &job.inputs.names());
     let interrupt = job.console.interrupt().clone();
     let mut streams = Streams::new(playing, &bar, interrupt.clone())?;
     // Pictures rendered so far are kept, also as a film.
@@ -81,6 +82,7 @@ pub(super) fn run(
                 }
             };
             let seconds = first.seconds_until(frame);
+            job.fewer_neighbors(&cloud).iter().for_each(|note| notes.tell(note));
             let rendered = job.render(renderer, &place.upright(cloud), &first.camera)?;
             tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
@@ -109,6 +111,7 @@ pub(super) fn run(
     rendered.and(written)?;
     let Statistics { dropped, refused, last_refusal, waiting, .. } = streams.statistics();
     drop(streams);
+    drop(notes);
     drop(bar);
     if tally.written == 0 {
         if interrupt.ending() {

@@ -44,7 +44,7 @@ pub(crate) fn run(args: RenderArgs, console: &Console) -> Result<(), Failure> {
     let read = milliseconds_since(started);
 
     job.check_color(&cloud)?;
-    let fewer = job.fit_neighbors(&cloud)?;
+    job.check_count(&cloud)?;
     let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
     let cloud = cloud.with_axes(axes);
 
@@ -54,7 +54,7 @@ pub(crate) fn run(args: RenderArgs, console: &Console) -> Result<(), Failure> {
     if degrees {
         notes.push("coordinates in degrees are shown in metres east, north and up of the points' middle".to_owned());
     }
-    notes.extend(fewer);
+    notes.extend(job.fewer_neighbors(&cloud));
     let placed = Placed { camera, axes, read, notes };
     let bar = Bar::spinner("rendering", console);
     match job.render(&mut renderer, &cloud, &camera) {

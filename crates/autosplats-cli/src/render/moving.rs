@@ -79,9 +79,7 @@ pub(super) fn run(
     let writer = Writer::start(job, film, rate);
     let mut render_all = || {
         for (number, &(frame, pictures)) in shown.iter().enumerate() {
-            if bar.cancelled() {
-                return Err(Failure::interrupted());
-            }
+            bar.tick(number as f32 / shown.len() as f32)?;
             let path = film.file(frame);
             if film.resume && path.as_ref().is_some_and(|path| path.exists()) {
                 tally.kept += 1;
@@ -90,6 +88,7 @@ pub(super) fn run(
             let started = Instant::now();
             let cloud = scene.frame(frame, &notes)?;
             let read_ms = super::milliseconds_since(started);
+            job.fewer_neighbors(&cloud).iter().for_each(|note| notes.tell(note));
             let rendered = job.render(renderer, &cloud, &camera)?;
             tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
@@ -100,7 +99,6 @@ pub(super) fn run(
                 return Ok(());
             }
             tally.written += pictures.unwrap_or(1);
-            bar.report((number + 1) as f32 / shown.len() as f32);
         }
         Ok(())
     };

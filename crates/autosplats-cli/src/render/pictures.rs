@@ -137,8 +137,7 @@ fn write_film(
     written: &Sender<Image>,
 ) -> Result<(), Failure> {
     let interrupt = style.console.interrupt();
-    let failure =
-        |error| if interrupt.requested() { Failure::interrupted() } else { Failure::new(Exit::Output, error) };
+    let failure = |error| Failure::new(Exit::Output, error);
     let mut reports = Vec::new();
     {
         // The lock makes Ctrl-C wait until the partial film is removed.

@@ -47,7 +47,7 @@ pub(crate) struct Job {
 /// State shared by the reader and the window.
 #[derive(Default)]
 struct State {
-    /// Progress, in 65,536ths.
+    /// Progress, 0 to 1, as the bits of an `f32`.
     done: AtomicU32,
     cancelled: AtomicBool,
 }
@@ -55,7 +55,7 @@ struct State {
 impl Job {
     /// Progress, 0 to 1.
     pub(crate) fn fraction(&self) -> f32 {
-        self.state.done.load(Ordering::Relaxed) as f32 / 65_536.0
+        f32::from_bits(self.state.done.load(Ordering::Relaxed))
     }
 
     /// Cancels the job; the reader stops at its next check.
@@ -225,6 +225,11 @@ fn read(order: &Order, frame: &SharedViewFrame, sender: &Sender<(JobId, JobNews)
     }
 }
 
+/// Whether a progress bar 100 pixels long moves: it needs 100 repaints.
+pub(super) fn moves_bar(before: f32, now: f32) -> bool {
+    (100.0 * before) as u32 != (100.0 * now) as u32
+}
+
 /// Receives progress, notes and points from a reader.
 struct Follower<'a> {
     order: &'a Order,
@@ -276,10 +281,9 @@ impl Preview {
 
 impl Progress for Follower<'_> {
     fn report(&self, fraction: f32) {
-        let done = (fraction.clamp(0.0, 1.0) * 65_536.0) as u32;
-        let before = self.order.state.done.swap(done, Ordering::Relaxed);
-        // A progress bar 100 pixels long needs 100 repaints.
-        if before / 656 != done / 656 {
+        let done = fraction.clamp(0.0, 1.0);
+        let before = f32::from_bits(self.order.state.done.swap(done.to_bits(), Ordering::Relaxed));
+        if moves_bar(before, done) {
             self.context.request_repaint();
         }
     }

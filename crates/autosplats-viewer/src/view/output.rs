@@ -11,8 +11,8 @@ use crate::threads::spawn;
 use crate::view::{Goal, Task};
 
 impl View {
-    /// Hands a picture to its goal. `range` is the value range of its colours.
-    pub(crate) fn photographed(&mut self, picture: Image, range: Option<[f64; 2]>, goal: Goal) {
+    /// Hands a picture to its goal. `range` holds the ends of its colour map.
+    pub(crate) fn photographed(&mut self, picture: Image, range: Option<[f32; 2]>, goal: Goal) {
         match goal {
             Goal::File(path) => self.save_picture(picture, path),
             Goal::Film(number) => {

@@ -105,12 +105,11 @@ impl Recording {
         Ok(Some(self.wish.clone()))
     }
 
-    /// Takes a finished picture and the value range of its colours.
+    /// Takes a finished picture and the ends of its colour map.
     pub(crate) fn arrived(&mut self, image: Image, range: Option<[f64; 2]>) {
         self.asked = false;
         if self.next == 1 {
             // All pictures keep the range of the first one.
-            let range = range.filter(|[low, high]| low < high);
             let known = &mut self.wish.settings.shading.range;
             *known = known.or(range);
         }

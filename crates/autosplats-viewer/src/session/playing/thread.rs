@@ -8,6 +8,7 @@ use autosplats_sources::{Statistics, Timeline};
 use eframe::egui;
 
 use crate::session::document::Bits;
+use crate::session::loading::moves_bar;
 use crate::session::{FirstLook, Input, SharedViewFrame, read_options};
 
 /// Longest silence of a live stream before the thread checks whether the stream is still wanted.
@@ -147,10 +148,10 @@ impl Progress for Follower<'_> {
         if post.begun {
             return;
         }
-        let before = std::mem::replace(&mut post.read, fraction.clamp(0.0, 1.0));
+        let fraction = fraction.clamp(0.0, 1.0);
+        let before = std::mem::replace(&mut post.read, fraction);
         drop(post);
-        // A progress bar 100 pixels long needs 100 repaints.
-        if (100.0 * before) as u32 != (100.0 * fraction) as u32 {
+        if moves_bar(before, fraction) {
             self.context.request_repaint();
         }
     }
