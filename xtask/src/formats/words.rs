@@ -111,3 +111,10 @@ pub(super) const FILES_TEXT: &str = "\
 The test data lies beside the repository; its README lists the origins. Points and bounds are those of `info --scan`. A
 file counts as rendered if `render` makes a picture.
 ";
+
+/// Text before the table of field cases.
+pub(super) const FIELD_TEXT: &str = "\
+## Field cases
+
+Small files with a fault each, as people have them, lie beside the test data.
+";

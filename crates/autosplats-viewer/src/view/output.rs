@@ -12,7 +12,7 @@ use crate::view::{Goal, Task};
 
 impl View {
     /// Hands a picture to its goal. `range` holds the ends of its colour map.
-    pub(crate) fn photographed(&mut self, picture: Image, range: Option<[f32; 2]>, goal: Goal) {
+    pub(crate) fn photographed(&mut self, picture: Image, range: Option<[f64; 2]>, goal: Goal) {
         match goal {
             Goal::File(path) => self.save_picture(picture, path),
             Goal::Film(number) => {
