@@ -20,7 +20,7 @@ fn square(values: impl FnOnce(Vec<f64>) -> FieldValues) -> (PointCloud, Camera) 
     let cloud = PointCloud::new(DVec3::ZERO, (0..SIDE * SIDE).map(position).collect());
     let cloud = cloud.with_field("value", values(along)).expect("a value each");
     let middle = DVec3::new(0.5, 0.5, 0.05);
-    let projection = Projection::PerspectiveFovDeg(40.0);
+    let projection = Projection::PerspectiveFovDeg(60.0);
     let camera = Camera { eye: middle + DVec3::new(0.1, -0.2, 1.1), look_at: middle, up: DVec3::Y, projection };
     (cloud, camera)
 }
