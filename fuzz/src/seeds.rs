@@ -37,7 +37,8 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         (first..first + POINTS - 2).map(|i| format!("{word} {i} {} {}\n", i + 1, i + 2)).collect()
     };
     let vertices: String = positions.lines().map(|row| format!("v {row}\n")).collect();
-    let sweep = |columns: usize| (0..POINTS * columns).flat_map(|i| (0.5 * (i % 40) as f32).to_le_bytes()).collect();
+    let number = |i: usize, columns: usize| 0.5 * (i / columns) as f32 + 20.0 * (i % columns) as f32;
+    let sweep = |columns: usize| (0..POINTS * columns).flat_map(|i| number(i, columns).to_le_bytes()).collect();
     Ok(vec![
         seeds("ply", [written("ply")?, vec![ascii_ply(), list_ply(), mesh_ply()]].concat()),
         seeds("pcd", [written("pcd")?, vec![ascii_pcd(), compressed_pcd()]].concat()),

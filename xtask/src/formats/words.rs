@@ -19,6 +19,9 @@ All readers:
   `GpsTime`, `NormalX` …), else the file's.
 - Points at exactly (0, 0, 0), which scanners write for missing returns, are dropped and counted. Points without a
   finite position are kept in the cloud and left out of pictures.
+- `--keep` chooses points by class, flag and return. Pictures leave out noise (classes 7 and 18) and withheld points;
+  written files and `info` keep them. In formats other than LAS this holds for a field called `Classification`; a `label`
+  7 may be anything, so it stays unless `--keep` says otherwise.
 - Notes on standard error, and the `warnings` of `info`, state what is lost, guessed, dropped or scaled.
 - A header's counts are compared with the file's size before memory is allocated. A broken file gives a message of one
   line: the file, the position, what is wrong and the remedy.
@@ -44,12 +47,13 @@ pub(super) const FORMAT_TEXTS: &[FormatText] = &[
     },
     FormatText {
         name: "PLY",
-        kept: "text and binary in both byte orders; all scalar properties of `vertex`, colours; faces for `convert --sample`",
-        not_kept: "list properties of points, other elements",
+        kept: "text and binary in both byte orders; all scalar properties of `vertex`, colours, also packed in `rgba` or as base \
+               colours of 3D Gaussian splats; faces for `convert --sample`",
+        not_kept: "list properties of points, other elements; compressed 3D Gaussian splats are refused",
     },
     FormatText {
         name: "PCD",
-        kept: "text, binary and compressed; fields of up to 16 values, colours packed in `rgb` or `rgba` or separate, the \
+        kept: "text, binary and compressed, from version 0.5 on; fields of up to 16 values, colours packed in `rgb` or `rgba` or separate, the \
                viewpoint as sensor position, or the origin for organised clouds whose rays meet there",
         not_kept: "the grid of organised clouds",
     },
@@ -77,14 +81,16 @@ pub(super) const FORMAT_TEXTS: &[FormatText] = &[
     },
     FormatText {
         name: "bare floats",
-        kept: "little-endian 32-bit floats without a header: x y z and intensity (KITTI), ring (nuScenes); others are stated \
-               by `--columns`",
+        kept: "little-endian 32-bit floats without a header: x y z and up to five more, such as intensity (KITTI) and ring \
+               (nuScenes). The numbers tell how many a point has; where they do not, `--columns` has to",
         not_kept: "",
     },
     FormatText {
         name: "depth image",
-        kept: "16-bit PNG and PGM, with intrinsics from an option or a file beside the image",
-        not_kept: "",
+        kept: "PNG and PGM of 16 bits, TIFF of 16 bits or floats, PFM, the channel of depths of OpenEXR; whole numbers are \
+               millimetres, floats metres, if nothing states another scale; swapped bytes are told and mended; intrinsics \
+               from an option or a file beside the image: ROS's `camera_info.yaml`, Open3D's JSON, bare numbers",
+        not_kept: "lens distortion; GeoTIFF, disparities and pictures of 8 bits are refused",
     },
     FormatText {
         name: "OBJ",
@@ -110,4 +116,11 @@ pub(super) const FILES_TEXT: &str = "\
 
 The test data lies beside the repository; its README lists the origins. Points and bounds are those of `info --scan`. A
 file counts as rendered if `render` makes a picture.
+";
+
+/// Text before the table of field cases.
+pub(super) const FIELD_TEXT: &str = "\
+## Field cases
+
+Small files with a fault each, as people have them, lie beside the test data.
 ";

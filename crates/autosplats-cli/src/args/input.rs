@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use autosplats_cloud::PointFilter;
 use autosplats_formats::DepthCamera;
 use clap::Args;
 
@@ -67,10 +68,16 @@ pub(crate) struct ReadingArgs {
     /// at the end all others of a text [default: from the header, else guessed, with a note]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) columns: Option<Vec<String>>,
-    /// Intrinsics of depth images in pixels, and SCALE, pixel values per metre, 1000 if left out [default: from a file
-    /// beside the image, else guessed]
+    /// Intrinsics of depth images in pixels, and SCALE, pixel values per metre; without it, whole numbers are
+    /// millimetres and floats metres [default: from a file beside the image, such as ROS's camera_info.yaml, else
+    /// guessed]
     #[arg(long, value_name = "FX,FY,CX,CY[,SCALE]", value_parser = values::depth_camera, allow_hyphen_values = true)]
     pub(crate) depth_camera: Option<DepthCamera>,
+    /// Points to keep, by class, flag and return, such as ground,building or 2..6,first. A hyphen leaves out:
+    /// -noise,-withheld. One word without a hyphen has to match for classes, one for flags, one for returns. 'all' keeps
+    /// all, 'usual' all but noise (classes 7 and 18) and withheld points [default: all, but usual for pictures]
+    #[arg(long, value_name = "WORDS", allow_hyphen_values = true)]
+    pub(crate) keep: Option<PointFilter>,
     /// Keep points at (0, 0, 0), the sensor itself, which scanners write for missing returns
     #[arg(long)]
     pub(crate) keep_no_returns: bool,

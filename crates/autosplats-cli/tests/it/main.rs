@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod bench_paper;
+mod choosing;
 mod common;
 mod convert;
 mod doctor;

@@ -2,7 +2,7 @@
 
 use autosplats_cloud::{Error, excerpt};
 
-use super::{Job, names};
+use super::{Attribute, Job, names};
 
 /// Largest number of values of a point; a header with more is broken.
 pub const MAX_COLUMNS: usize = 1024;
@@ -125,6 +125,24 @@ pub(super) fn is_longitude(name: &str) -> bool {
 pub(super) fn is_known(name: &str) -> bool {
     let plain = names::plain(name);
     names::field(&plain).is_some() || names::COLORS.iter().any(|channels| names::contains(channels, &plain))
+}
+
+/// Whether a name is one of latitude.
+pub(super) fn is_latitude(name: &str) -> bool {
+    names::contains(names::LATITUDES, &names::plain(name))
+        || names::words(name).iter().any(|word| word.len() > 2 && names::contains(names::LATITUDES, word))
+}
+
+/// Attributes whose names differ: an underscore is added to each that comes again, as to the fields of a cloud.
+pub(super) fn unrepeated(attributes: impl Iterator<Item = Attribute>) -> Vec<Attribute> {
+    let mut all: Vec<Attribute> = Vec::new();
+    for mut attribute in attributes.take(MAX_COLUMNS) {
+        while all.iter().any(|other| other.name == attribute.name) {
+            attribute.name.push('_');
+        }
+        all.push(attribute);
+    }
+    all
 }
 
 /// Indices of red, green and blue among the names, if all are there.

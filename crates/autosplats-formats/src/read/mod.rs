@@ -11,6 +11,7 @@
 //! A file is not trusted: the claims of its header are checked against its size before anything is allocated.
 
 mod body;
+mod choose;
 mod columns;
 mod depth_image;
 mod describe;
@@ -36,6 +37,7 @@ mod sensor;
 mod stl;
 pub mod table;
 mod text;
+mod units;
 mod unpack;
 mod xyz;
 
@@ -46,6 +48,6 @@ pub use self::{
     options::{DepthCamera, ReadOptions},
     registry::{
         check_not_lfs_pointer, describe, describe_bytes, formats, gltf_animation, is_named_as_points, read, read_bytes,
-        read_gltf_at, read_mesh, read_mesh_bytes, read_with,
+        read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with,
     },
 };

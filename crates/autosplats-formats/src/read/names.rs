@@ -8,6 +8,11 @@ pub(super) const LONGITUDES: &str = "longitude lon long lng longitud longitudine
     geographischelange geographischelaenge lengtegraad lengdegrad langdgrad pituusaste dlugosc dlugoscgeograficzna \
     zemepisnadelka boylam долгота довгота 经度 經度 経度 경도";
 
+/// Names of latitudes.
+pub(super) const LATITUDES: &str = "latitude lat latitud latitudine breite breitengrad geographischebreite \
+    breedtegraad breddegrad breddgrad leveysaste szerokosc szerokoscgeograficzna zemepisnasirka enlem широта 纬度 緯度 \
+    위도";
+
 /// Names of x, y and z, the likeliest first. Whatever letters a country's surveyors use, x is east and y is north.
 pub(super) const AXES: [&[&str]; 3] = [
     &[
@@ -30,8 +35,7 @@ pub(super) const AXES: [&[&str]; 3] = [
         "polnoc polnocna sever sjever eszak север северная северный північ", // Slavic, Hungarian
         "kuzey yukari yukarideger",                      // Turkish
         "北 北坐标 北向 北距 北方向 纵坐标 y坐标 北坐標 北座標 縱坐標 y座標 북 북쪽 북거 y좌표",
-        "latitude lat latitud latitudine breite breitengrad geographischebreite breedtegraad breddegrad breddgrad \
-         leveysaste szerokosc szerokoscgeograficzna zemepisnasirka enlem широта 纬度 緯度 위도",
+        LATITUDES,
     ],
     &[
         "z zcoord zcoordinate coordz coordinatez coordenadaz zkoordinate zkoordinaat posz positionz pz points2",

@@ -15,6 +15,7 @@ use super::{
     table::{ProgressRange, Scalar},
     text::{self, Rows, Short, Token},
 };
+use crate::color_scale::{ColorScale, Levels};
 
 /// Fraction of the work that parsing takes.
 const PARSING: f32 = 0.8;
@@ -216,7 +217,7 @@ fn after_lines(bytes: &[u8], mut at: usize, count: usize) -> (usize, usize) {
     (at, lines + usize::from(unfinished))
 }
 
-/// Points of a scan as records: x, y and z in 24 bytes, intensity in 4, colour in 3.
+/// Points of a scan as records: x, y and z in 24 bytes, intensity in 4, colour in 12.
 struct Records {
     bytes: Vec<u8>,
     stride: usize,
@@ -246,11 +247,11 @@ impl Records {
         let (has_intensity, has_color) = (matches!(width, 4 | 7), width >= 6);
         let mut tokens = vec![Token::Store(Scalar::F64); 3];
         tokens.extend(has_intensity.then_some(Token::Store(Scalar::F32)));
-        tokens.extend([Token::Store(Scalar::U8); 3].into_iter().take(if has_color { 3 } else { 0 }));
+        tokens.extend([Token::Store(Scalar::F32); 3].into_iter().take(if has_color { 3 } else { 0 }));
         let stride: usize = tokens.iter().map(|token| token.size()).sum();
         job.check_memory(scan.count, 2 * stride)?;
-        let short = Short::new(width.saturating_sub(3), GREY);
-        let rows = Rows { tokens: &tokens, count: Some(scan.count), counts_between: false };
+        let short = Short::new(width.saturating_sub(3));
+        let rows = Rows { tokens: &tokens, count: Some(scan.count), may_be_cut: false };
         let own = Job { bytes: &job.bytes[..scan.points.end], ..*job };
         let (bytes, count) = if has_color {
             rows.parse_with_short(&own, scan.points.start, part, &short)?
@@ -295,20 +296,28 @@ impl Records {
         if self.world_from_local == DMat4::IDENTITY { local } else { self.world_from_local.transform_point3(local) }
     }
 
-    fn intensity(&self, point: usize) -> f32 {
-        self.intensity.map_or(f32::NAN, |at| {
-            let mut raw = [0; 4];
-            raw.copy_from_slice(&self.record(point)[at..at + 4]);
-            f32::from_le_bytes(raw)
-        })
+    fn number(&self, point: usize, at: usize) -> f32 {
+        let mut raw = [0; 4];
+        raw.copy_from_slice(&self.record(point)[at..at + 4]);
+        f32::from_le_bytes(raw)
     }
 
-    fn color(&self, point: usize) -> [u8; 3] {
+    fn intensity(&self, point: usize) -> f32 {
+        self.intensity.map_or(f32::NAN, |at| self.number(point, at))
+    }
+
+    /// Levels of the colours of some points.
+    fn levels(&self, points: Range<usize>) -> Levels {
+        let Some(at) = self.color else { return Levels::default() };
+        let channel = |point: usize| [at, at + 4, at + 8].map(|at| f64::from(self.number(point, at)));
+        Levels::of(points.len(), |i| channel(points.start + i))
+    }
+
+    fn color(&self, point: usize, scale: ColorScale) -> [u8; 3] {
         // Grey, if other scans have colours.
-        self.color.map_or([GREY; 3], |at| {
-            let record = self.record(point);
-            [record[at], record[at + 1], record[at + 2]]
-        })
+        let Some(at) = self.color else { return [GREY; 3] };
+        let color = [at, at + 4, at + 8].map(|at| self.number(point, at));
+        if color[0].is_nan() { [GREY; 3] } else { color.map(|value| scale.byte(value.into())) }
     }
 }
 
@@ -387,9 +396,12 @@ fn cloud(
     if records.iter().all(|records| records.color.is_none()) {
         return Ok(cloud);
     }
+    let levels = records.iter().map(|records| records.levels(0..records.len()));
+    let scale = ColorScale::of_levels(levels.fold(Levels::default(), Levels::and), true);
+    scale.note().iter().for_each(|note| job.note(note));
     let colors = fill(job, "colours", lens, part(1), |scan| {
         let records = &records[scan];
-        move |i| records.color(i)
+        move |i| records.color(i, scale)
     })?;
     cloud.with_colors(colors)
 }
@@ -405,7 +417,8 @@ fn preview(job: &Job<'_>, records: &Records) -> Result<(), Error> {
             if records.color.is_none() {
                 return Ok(cloud);
             }
-            cloud.with_colors(fill(&quiet, "colours", &lens, nothing, |_| move |i| records.color(start + i))?)
+            let scale = ColorScale::of_levels(records.levels(start..start + lens[0]), true);
+            cloud.with_colors(fill(&quiet, "colours", &lens, nothing, |_| move |i| records.color(start + i, scale))?)
         })?;
     }
     Ok(())

@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use autosplats_cloud::{Bytes, Contents, Error, PointCloud, Progress};
+use autosplats_cloud::{Bytes, Contents, Error, LeftOut, PointCloud, Progress};
 
 use super::{
-    depth_image,
+    choose, depth_image,
     describe::Description,
     e57, gltf, grid,
     job::{Format, Job},
     las, obj, off,
     options::ReadOptions,
-    pcd, ply, ptx, raw, sensor, stl,
+    pcd, ply, ptx, raw, sensor, stl, units,
     unpack::{Unpacked, without_gz},
     xyz,
 };
@@ -62,7 +62,8 @@ fn format_names() -> String {
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read; [`Error::UnknownFormat`], [`Error::Malformed`] and [`Error::Unsupported`]
-/// for its content; [`Error::OutOfMemory`]; and [`Error::Cancelled`] if `progress` says so.
+/// for its content; [`Error::NothingKept`] if the options keep none of its points; [`Error::OutOfMemory`]; and
+/// [`Error::Cancelled`] if `progress` says so.
 ///
 /// # Examples
 ///
@@ -112,7 +113,39 @@ pub fn read_bytes(
     options: &ReadOptions,
     progress: &dyn Progress,
 ) -> Result<PointCloud, Error> {
-    with_job(name, bytes, options, progress, false, |job, _| Ok(contents(job)?.cloud))
+    with_job(name, bytes, options, progress, false, |job, _| Ok(kept(job)?.cloud))
+}
+
+/// Like [`read_with`], but returns all points, and which of them [`ReadOptions::keep`] leaves out.
+///
+/// # Errors
+/// Those of [`read`].
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::PointFilter;
+/// use autosplats_formats::{ReadOptions, read_marked};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("scan.csv");
+/// std::fs::write(&path, "x,y,z,Classification\n1,2,3,2\n4,5,60,7\n")?;
+/// let options = ReadOptions { keep: Some(PointFilter::usual()), ..ReadOptions::default() };
+/// let (cloud, left_out) = read_marked(&path, &options, &())?;
+/// assert_eq!(cloud.len(), 2);
+/// assert!(!left_out.has(0) && left_out.has(1), "noise");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read_marked(
+    path: &Path,
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<(PointCloud, LeftOut), Error> {
+    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    with_job(path, &bytes, options, progress, false, |job, _| {
+        let (contents, left) = contents(job)?;
+        Ok((contents.cloud, left))
+    })
 }
 
 /// Reads points and the triangles between them.
@@ -146,7 +179,7 @@ pub fn read_mesh_bytes(
     options: &ReadOptions,
     progress: &dyn Progress,
 ) -> Result<Contents, Error> {
-    with_job(name, bytes, options, progress, true, |job, _| contents(job))
+    with_job(name, bytes, options, progress, true, |job, _| kept(job))
 }
 
 /// Duration of the first animation of a glTF in seconds, and the number of animations, if there are any.
@@ -195,6 +228,7 @@ pub fn describe(path: &Path, options: &ReadOptions) -> Result<Description, Error
 pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Description, Error> {
     with_job(name, bytes, options, &(), false, |job, unpacked| {
         let mut description = (format(job)?.describe)(job)?;
+        units::settle_description(&mut description);
         if let Some(encoding) = unpacked.encoding {
             description.details.retain(|(name, _)| name != "encoding");
             description.details.insert(0, ("encoding".into(), encoding.into()));
@@ -267,21 +301,33 @@ fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
         .ok_or_else(|| Error::UnknownFormat { path: job.path.into(), known: format_names() })
 }
 
-fn contents(job: &Job<'_>) -> Result<Contents, Error> {
+/// Reads a file and removes the points that the options leave out.
+fn kept(job: &Job<'_>) -> Result<Contents, Error> {
+    let (mut contents, left) = contents(job)?;
+    choose::remove(&mut contents, &left);
+    Ok(contents)
+}
+
+/// Reads a file. Returns the points that the options leave out too.
+fn contents(job: &Job<'_>) -> Result<(Contents, LeftOut), Error> {
     job.tick(0.0)?;
     let format = format(job)?;
     if job.options.columns.is_some() && !takes_columns(job, format) {
         job.note(format!("--columns is for text and headerless records; {} names its own columns", format.name));
     }
-    let mut contents = (format.read)(job)?;
+    let previews = choose::ChosenPreviews::new(job, format);
+    let progress = previews.as_ref().map_or(job.progress, |previews| previews as &dyn Progress);
+    let mut contents = (format.read)(&Job { progress, ..*job })?;
+    units::settle(job, &mut contents.cloud)?;
     let model = MODELS.iter().any(|model| model.name == format.name) || ply::is_mesh(job);
     // Dropping points would remove corners of a mesh.
     if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {
         drop_no_returns(job, format, &mut contents.cloud);
     }
+    let left = choose::left_out(job, format, &contents.cloud)?;
     sensor::drop_far(job, &mut contents.cloud);
     job.tick(1.0)?;
-    Ok(contents)
+    Ok((contents, left))
 }
 
 /// Whether the caller may name the columns of this file.

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::{
     Job,
+    columns::{is_latitude, is_longitude},
     table::{CHUNK, ProgressRange, Scalar, reserve},
 };
 
@@ -21,7 +22,7 @@ pub(super) const TEXT: &str = "text";
 
 /// Whether a value is a coordinate, which keeps all its digits.
 pub(super) fn is_coordinate(name: &str) -> bool {
-    ["x", "y", "z"].contains(&&*name.to_ascii_lowercase())
+    ["x", "y", "z"].contains(&&*name.to_ascii_lowercase()) || is_longitude(name) || is_latitude(name)
 }
 
 /// What to do with the next value of a row.
@@ -38,6 +39,18 @@ pub(super) enum Token {
 }
 
 impl Token {
+    /// How to store a value of this name and declared type, and in which type: coordinates keep all their digits, and
+    /// packed colours their bits.
+    pub(super) fn of(name: &str, scalar: Scalar) -> (Scalar, Self) {
+        if is_coordinate(name) {
+            (Scalar::F64, Self::Store(Scalar::F64))
+        } else if is_packed_color(name, scalar) {
+            (Scalar::U32, Self::Packed)
+        } else {
+            (scalar, Self::Store(scalar))
+        }
+    }
+
     /// Bytes of the value in the record.
     pub(super) fn size(self) -> usize {
         match self {
@@ -53,20 +66,19 @@ pub(super) struct Rows<'a> {
     pub(super) tokens: &'a [Token],
     /// Number of rows to read; `None` reads to the end of the file.
     pub(super) count: Option<usize>,
-    /// Whether lines of a single integer are counts, not rows.
-    pub(super) counts_between: bool,
+    /// Whether the text may end before all rows, which is told.
+    pub(super) may_be_cut: bool,
 }
 
-/// Rows that end early: after how many values, the byte that fills the rest of their records, and how many there are.
+/// Rows that end early: after how many values, and how many there are. The floats that they lack are NaN.
 pub(super) struct Short {
     values: usize,
-    fill: u8,
     rows: AtomicUsize,
 }
 
 impl Short {
-    pub(super) fn new(values: usize, fill: u8) -> Self {
-        Self { values, fill, rows: AtomicUsize::new(0) }
+    pub(super) fn new(values: usize) -> Self {
+        Self { values, rows: AtomicUsize::new(0) }
     }
 
     /// Number of such rows so far.
@@ -124,6 +136,7 @@ impl Rows<'_> {
         let wanted = self.count.unwrap_or(usize::MAX);
         let mut records = Vec::new();
         let (mut rows, mut shown) = (0, 0);
+        let mut complete_last = true;
         let mut at = start;
         while at < text.len() && rows < wanted {
             job.tick(part.start + part.len * (at - start) as f32 / (text.len() - start) as f32)?;
@@ -144,6 +157,11 @@ impl Rows<'_> {
                     break;
                 }
                 if let Some((offset, what)) = piece.error {
+                    // An unfinished last line.
+                    if self.may_be_cut && rows > 0 && line_end(text, offset) == text.len() {
+                        complete_last = false;
+                        break;
+                    }
                     return Err(job.malformed(job.line(offset), what));
                 }
             }
@@ -153,10 +171,20 @@ impl Rows<'_> {
             }
         }
         if self.count.is_some() && rows < wanted {
-            return Err(job.malformed(
-                job.line(text.len()),
-                format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
-            ));
+            if self.may_be_cut {
+                if !text.ends_with(b"\n") && complete_last {
+                    // Digits of the last value may be missing.
+                    rows = rows.saturating_sub(1);
+                    records.truncate(rows * len);
+                    shown = shown.min(rows);
+                }
+                job.tell_cut_off(rows, wanted, "points")?;
+            } else {
+                return Err(job.malformed(
+                    job.line(text.len()),
+                    format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
+                ));
+            }
         }
         show(&records[shown * len..], rows - shown)?;
         Ok((records, rows))
@@ -172,7 +200,7 @@ impl Rows<'_> {
         while at < text.len() {
             let end = line_end(text, at);
             let line = trim(&text[at..end]);
-            if !(is_blank(line) || self.counts_between && is_count(line)) {
+            if !is_blank(line) {
                 let len = piece.records.len();
                 if let Err(what) = self.parse_row(line, short, &mut piece.records) {
                     piece.records.truncate(len);
@@ -193,7 +221,8 @@ impl Rows<'_> {
                 let rest = self.tokens[index..].iter().map(|token| token.size()).sum::<usize>();
                 return match short.filter(|short| short.values == index) {
                     Some(short) => {
-                        record.resize(record.len() + rest, short.fill);
+                        // All bits of the filling are set, which is NaN in floats of any size.
+                        record.resize(record.len() + rest, u8::MAX);
                         short.rows.fetch_add(1, Ordering::Relaxed);
                         Ok(())
                     }
@@ -250,15 +279,12 @@ fn store(scalar: Scalar, value: &[u8], record: &mut Vec<u8>) -> Result<(), Strin
     Ok(())
 }
 
-/// Decodes a packed colour: an integer, a float whose bits are the colour, or, in old files, a float whose value is the
-/// colour. Such values are whole numbers, which floats of colour bits never are.
+/// Decodes a packed colour: an integer, or, with a point or an exponent, a float whose bits are the colour.
 fn packed(value: &[u8]) -> Result<u32, String> {
-    if let Some(integer) = std::str::from_utf8(value).ok().and_then(|text| text.parse::<i64>().ok()) {
-        return Ok(integer as u32);
+    match std::str::from_utf8(value).ok().and_then(|text| text.parse::<i64>().ok()) {
+        Some(integer) => Ok(integer as u32),
+        None => Ok((number(value)? as f32).to_bits()),
     }
-    let number = number(value)?;
-    let whole = number.fract() == 0.0 && (1.0..16_777_216.0).contains(&number);
-    Ok(if whole { number as u32 } else { (number as f32).to_bits() })
 }
 
 /// A number, including `nan` and `inf` in any letter case.
@@ -287,6 +313,11 @@ pub(super) fn trim(line: &[u8]) -> &[u8] {
 #[inline]
 pub(super) fn without_mark(line: &[u8]) -> &[u8] {
     line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line)
+}
+
+/// Whether a value is a colour packed into 32 bits.
+pub(super) fn is_packed_color(name: &str, scalar: Scalar) -> bool {
+    scalar.size() == 4 && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase())
 }
 
 /// Whether a trimmed line is empty or a comment.

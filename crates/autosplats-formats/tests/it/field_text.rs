@@ -218,8 +218,8 @@ fn thousands_of_every_kind() {
     // Whole numbers in groups show what the single group means.
     let (cloud, _) = noted("a.csv", "5.401.233;1.250;9\n5.401.234;1.251;8\n");
     assert_eq!(world(&cloud)[0], [5_401_233.0, 1250.0, 9.0], "thousands with points");
-    let (cloud, _) = noted("a.csv", "1,250;2,5;9\n1,251;2,5;8\n");
-    assert_eq!(world(&cloud)[0], [1.25, 2.5, 9.0], "decimal commas");
+    let (cloud, _) = noted("a.csv", "1,250;500,5;9\n1,251;500,5;8\n");
+    assert_eq!(world(&cloud)[0], [1.25, 500.5, 9.0], "decimal commas");
     for text in
         ["\"1,250\",\"2,500\",\"3,750\"\n", "1,5;2.5;3\n", "1,5;2.500;3\n", "1,250;1.250;3\n", "1,234,567;2,5;3\n"]
     {

@@ -417,7 +417,7 @@ fn errors_name_place_and_remedy() {
     let vertex = format!("{vertex}property float z\nend_header\n");
     check("a.ply", format!("{vertex}1 2 3\n4 5\n").as_bytes(), &["line 9", "2 values", "3"]);
     check("a.ply", format!("{vertex}1 2 3\n4 5 6 7\n").as_bytes(), &["line 9", "'7'"]);
-    check("a.ply", format!("{vertex}1 2 3\n").as_bytes(), &["after 1 of 2 points", "copy"]);
+    check("a.ply", vertex.as_bytes(), &["before the first of 2 points", "copy"]);
     check("a.ply", b"ply\nformat ascii 1.0\nelement vertex many\n", &["line 3", "'many'"]);
     check("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty \x1b[31m x\n", &["line 4", "[31m"]);
     check("a.ply", b"", &["empty"]);

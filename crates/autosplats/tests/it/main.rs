@@ -8,6 +8,7 @@ use autosplats::{Backend, Error, Renderer};
 mod backends;
 mod kd_tree;
 mod properties;
+mod ranges;
 mod sensors;
 mod smoothing;
 mod surfels;

@@ -3,11 +3,16 @@
 //! The text is cut into pieces at line ends. The pieces are parsed in parallel, each into columns of its own, which are
 //! appended to the cloud's columns in order. Besides the cloud, only one batch of pieces is in memory.
 
-use autosplats_cloud::{Error, FieldValues, PointCloud, excerpt, residual, storage_origin};
+use autosplats_cloud::{Crs, Error, FieldValues, PointCloud, Unit, degree_origin, excerpt, residual, storage_origin};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::{Job, table::reserve, text};
+use super::super::{
+    Job,
+    table::reserve,
+    text,
+    units::{LOOKS_LIKE_DEGREES, look_like_degrees},
+};
 use super::{
     cells::{Separator, is_comment, is_count, is_missing, trimmed},
     layout::{Layout, Target},
@@ -36,7 +41,7 @@ const NO_HEIGHTS: [f64; 4] = [-9999.0, -99999.0, -32767.0, -32768.0];
 /// Reads the rows from byte `start` on.
 pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Option<usize>) -> Result<PointCloud, Error> {
     let text = job.bytes;
-    let (origin, row_len) = survey(job, layout, start);
+    let Survey { origin, crs, row_len } = survey(job, layout, start);
     job.check_memory((text.len() - start) / row_len, layout.bytes_per_point(job.options.exact))?;
     let parser = Parser { layout, origin, exact: job.options.exact, counts_between: promised.is_some() };
     let mut all = Columns::new(layout);
@@ -54,7 +59,7 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
         job.preview(|| {
             let mut chunk = Columns::new(layout);
             pieces.iter().try_for_each(|piece| chunk.append(&piece.columns))?;
-            chunk.into_cloud(layout, origin, false)
+            chunk.into_cloud(&Job { progress: &(), ..*job }, layout, origin, false)
         })?;
         for piece in pieces {
             all.append(&piece.columns)?;
@@ -73,7 +78,7 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
     without.check(job, all.positions.len())?;
     check_promise(job, all.positions.len(), promised, counts_between)?;
     job.tick(PARSING)?;
-    let mut cloud = all.into_cloud(layout, origin, job.options.exact)?;
+    let mut cloud = all.into_cloud(job, layout, origin, job.options.exact)?.with_crs(crs);
     drop_no_heights(job, &mut cloud);
     Ok(cloud)
 }
@@ -166,8 +171,16 @@ fn check_promise(job: &Job<'_>, rows: usize, first: Option<usize>, between: usiz
     Ok(())
 }
 
-/// An origin for the points and the mean length of a row in bytes, from rows sampled all over the text.
-fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
+/// What rows sampled all over the text tell.
+struct Survey {
+    /// An origin for the points.
+    origin: DVec3,
+    crs: Crs,
+    /// Mean length of a row in bytes.
+    row_len: usize,
+}
+
+fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> Survey {
     let text = job.bytes;
     let mut points = Vec::new();
     let (mut last, mut bytes) = (None, 0);
@@ -196,9 +209,18 @@ fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
             points.push(DVec3::from(point));
         }
     }
-    let origin = storage_origin(points.len(), |i| points[i]);
+    let mut crs = layout.crs.clone();
+    if crs == Crs::default() && job.options.columns.is_none() && look_like_degrees(points.len(), |i| points[i]) {
+        crs.unit = Some(Unit::Degree);
+        job.note(LOOKS_LIKE_DEGREES);
+    }
+    let origin = if crs.unit == Some(Unit::Degree) {
+        degree_origin(points.len(), |i| points[i])
+    } else {
+        storage_origin(points.len(), |i| points[i])
+    };
     // The shortest row has three digits, each followed by a byte.
-    (origin, bytes.checked_div(points.len()).unwrap_or(0).max(6))
+    Survey { origin, crs, row_len: bytes.checked_div(points.len()).unwrap_or(0).max(6) }
 }
 
 impl Layout {
@@ -263,7 +285,7 @@ impl Columns {
         Ok(())
     }
 
-    fn into_cloud(self, layout: &Layout, origin: DVec3, exact: bool) -> Result<PointCloud, Error> {
+    fn into_cloud(self, job: &Job<'_>, layout: &Layout, origin: DVec3, exact: bool) -> Result<PointCloud, Error> {
         let mut positions = self.positions;
         positions.shrink_to_fit();
         let mut cloud = PointCloud::new(origin, positions);
@@ -271,7 +293,7 @@ impl Columns {
             cloud = cloud.with_residuals(self.residuals)?;
         }
         if layout.has_color {
-            cloud = with_colors(cloud, self.colors, exact)?;
+            cloud = with_colors(job, cloud, self.colors, exact)?;
         }
         for ((name, _), values) in layout.fields.iter().zip(self.fields) {
             let values = match values {
@@ -283,7 +305,6 @@ impl Columns {
             };
             cloud = cloud.with_field(name, values)?;
         }
-        cloud = cloud.with_crs(layout.crs.clone());
         Ok(cloud)
     }
 }
@@ -301,15 +322,15 @@ fn floats(bytes: &[[u8; 3]]) -> Result<Vec<[f32; 3]>, Error> {
     Ok(floats)
 }
 
-fn with_colors(cloud: PointCloud, colors: Colors, exact: bool) -> Result<PointCloud, Error> {
+fn with_colors(job: &Job<'_>, cloud: PointCloud, colors: Colors, exact: bool) -> Result<PointCloud, Error> {
     let floats = match colors {
         // If no value exceeds 1, the colours are rather floats that happen to be 0 or 1.
         Colors::Bytes(bytes) if bytes.par_iter().flatten().any(|&value| value > 1) => return cloud.with_colors(bytes),
         Colors::Bytes(bytes) => floats(&bytes)?,
         Colors::Floats(floats) => floats,
     };
-    let largest = floats.par_iter().flatten().copied().reduce(|| 0.0, f32::max);
-    let scale = ColorScale::of(largest.into(), true);
+    let scale = ColorScale::of(floats.len(), true, |i| floats[i].map(f64::from));
+    scale.note().iter().for_each(|note| job.note(note));
     let mut bytes = Vec::new();
     reserve(&mut bytes, floats.len(), "colours")?;
     bytes.par_extend(floats.par_iter().map(|color| color.map(|value| scale.byte(value.into()))));
