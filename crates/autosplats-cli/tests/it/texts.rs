@@ -24,7 +24,7 @@ fn values_may_begin_with_a_hyphen() {
         ("--frames", "-3", "A..B"),
         ("--size", "-3x4", "1760x900"),
         ("--depth-camera", "-525,525,320,240", "depth-camera"),
-        ("--background", "-red", "#rrggbb"),
+        ("--background", "-red", "--background"),
         ("--pose", "-a.ply=pose.txt", "sphere.ply"),
         ("--eye", "-1,2", "three numbers"),
         ("--range", "-1..-2", "lower"),
