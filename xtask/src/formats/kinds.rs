@@ -15,5 +15,4 @@ pub(super) struct Kind {
 }
 
 /// All kinds, in the order of the document.
-pub(super) const KINDS: &[Kind] = &[
-];
+pub(super) const KINDS: &[Kind] = &[];

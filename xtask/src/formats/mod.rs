@@ -189,10 +189,7 @@ fn files(program: &Path, data: &Path, text: &str, document: &mut String) -> Resu
     let points: usize = rows.iter().map(FileRow::files).sum();
     let read: usize = rows.iter().filter(|row| row.is_read()).map(FileRow::files).sum();
     let rendered: usize = rows.iter().filter(|row| row.is_rendered()).map(FileRow::files).sum();
-    let _ = writeln!(
-        document,
-        "\nOf {points} point files, {read} are read and {rendered} are rendered."
-    );
+    let _ = writeln!(document, "\nOf {points} point files, {read} are read and {rendered} are rendered.");
     if !others.is_empty() {
         document.push_str("\nFiles without points:\n\n");
     }

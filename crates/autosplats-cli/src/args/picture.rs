@@ -142,7 +142,7 @@ pub(crate) struct SurfaceArgs {
 pub(crate) struct LookArgs {
     /// auto, rgb, plain, height, intensity, classification, normal, curvature, radius, k-radius, depth, or the name of
     /// a field (field:NAME if a mode has the same name)
-    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = values::color)]
+    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = values::color, allow_hyphen_values = true)]
     pub(crate) color: ColorMode,
     /// Values at both ends of the colour map [default: 1st and 99th percentile of the picture]
     #[arg(long, value_name = "A..B", value_parser = values::range, allow_hyphen_values = true)]
@@ -168,6 +168,6 @@ pub(crate) struct LookArgs {
     pub(crate) backs: BacksChoice,
     /// Colour by its CSS name such as white, or '#rrggbb'; two as TOP,BOTTOM for a gradient; or transparent, for .png
     /// and .exr [default: dark grey gradient]
-    #[arg(long, value_name = "COLOR")]
+    #[arg(long, value_name = "COLOR", allow_hyphen_values = true)]
     pub(crate) background: Option<Background>,
 }

@@ -1,12 +1,11 @@
 //! The camera: from flags to a placed eye.
 
-use std::fs::read_to_string;
 use std::io::{Error, Write as _};
 use std::path::{Path, PathBuf};
 
 use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{Axes, PointCloud};
+use autosplats_cloud::{Axes, PointCloud, read_text};
 use autosplats_formats::PinholeCamera;
 use autosplats_scenes::{Scene, View};
 use serde_json::error::Category;
@@ -154,7 +153,7 @@ fn upward(axes: Axes, sight: DVec3) -> DVec3 {
 
 fn load(path: &Path, console: &Console) -> Result<Camera, Failure> {
     let shown = path.display();
-    let text = read_to_string(path).map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
+    let text = read_text(path).map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
     if let Some(pinhole) = PinholeCamera::parse(&text) {
         return of_pinhole(path, &pinhole, console);
     }

@@ -17,4 +17,5 @@ mod normals;
 mod real_files;
 mod render;
 mod streams;
+mod texts;
 mod usage;

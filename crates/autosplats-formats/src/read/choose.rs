@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use autosplats_cloud::{Contents, Error, LeftOut, PointCloud, PointFilter, Progress, class_name};
 
 use super::{
-    columns::plain,
     job::{Format, Job},
     las,
+    names::plain,
 };
 
 /// Most classes and fields that a message names.

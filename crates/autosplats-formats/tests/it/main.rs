@@ -6,6 +6,7 @@ mod choosing;
 mod common;
 mod depth_images;
 mod e57;
+mod field_text;
 mod formats;
 mod gltf;
 mod hostile;

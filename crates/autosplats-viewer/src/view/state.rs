@@ -73,7 +73,7 @@ impl State {
     /// # Errors
     /// A message with the file's name and what is wrong.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let text = autosplats::cloud::read_text(path).map_err(|error| format!("{}: {error}", path.display()))?;
         // Only an object is accepted: an empty list would deserialize as a session of defaults.
         let state = serde_json::from_str::<serde_json::Map<_, _>>(&text)
             .and_then(|fields| serde_json::from_value::<Self>(fields.into()))

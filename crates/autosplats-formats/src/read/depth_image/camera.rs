@@ -1,9 +1,11 @@
 //! The camera of a depth image.
 
 use std::{
-    fs::{metadata, read_to_string},
+    fs::metadata,
     path::{Path, PathBuf},
 };
+
+use autosplats_cloud::read_text;
 
 use super::Job;
 use crate::{DepthCamera, PinholeCamera};
@@ -52,7 +54,7 @@ impl Camera {
                 continue;
             }
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let Some(found) = read_to_string(&path).ok().and_then(|text| PinholeCamera::parse(&text)) else {
+            let Some(found) = read_text(&path).ok().and_then(|text| PinholeCamera::parse(&text)) else {
                 notes.push(format!("{name} holds no camera that is understood; ignored"));
                 continue;
             };
