@@ -117,20 +117,24 @@ pub(super) fn find_axes(names: &[String]) -> Option<[usize; 3]> {
 
 /// Whether a name is one of longitude.
 pub(super) fn is_longitude(name: &str) -> bool {
-    names::contains(names::LONGITUDES, &names::plain(name))
-        || names::words(name).iter().any(|word| word.len() > 2 && names::contains(names::LONGITUDES, word))
+    is_degrees(names::LONGITUDES, name)
+}
+
+/// Whether a name is one of latitude.
+pub(super) fn is_latitude(name: &str) -> bool {
+    is_degrees(names::LATITUDES, name)
+}
+
+/// Whether a name, or a word of it, is in a list of longitudes or latitudes.
+fn is_degrees(list: &str, name: &str) -> bool {
+    names::contains(list, &names::plain(name))
+        || names::words(name).iter().any(|word| word.len() > 2 && names::contains(list, word))
 }
 
 /// Whether a name is one of a colour or of a known attribute, which is no coordinate.
 pub(super) fn is_known(name: &str) -> bool {
     let plain = names::plain(name);
     names::field(&plain).is_some() || names::COLORS.iter().any(|channels| names::contains(channels, &plain))
-}
-
-/// Whether a name is one of latitude.
-pub(super) fn is_latitude(name: &str) -> bool {
-    names::contains(names::LATITUDES, &names::plain(name))
-        || names::words(name).iter().any(|word| word.len() > 2 && names::contains(names::LATITUDES, word))
 }
 
 /// Attributes whose names differ: an underscore is added to each that comes again, as to the fields of a cloud.

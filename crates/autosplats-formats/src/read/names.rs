@@ -8,10 +8,9 @@ pub(super) const LONGITUDES: &str = "longitude lon long lng longitud longitudine
     geographischelange geographischelaenge lengtegraad lengdegrad langdgrad pituusaste dlugosc dlugoscgeograficzna \
     zemepisnadelka boylam долгота довгота 经度 經度 経度 경도";
 
-/// Names of latitudes.
-pub(super) const LATITUDES: &str = "latitude lat latitud latitudine breite breitengrad geographischebreite \
-    breedtegraad breddegrad breddgrad leveysaste szerokosc szerokoscgeograficzna zemepisnasirka enlem широта 纬度 緯度 \
-    위도";
+/// Names of latitudes, which are in degrees.
+pub(super) const LATITUDES: &str = "latitude lat latitud latitudine breite breitengrad geographischebreite breedtegraad breddegrad breddgrad \
+    leveysaste szerokosc szerokoscgeograficzna zemepisnasirka enlem широта 纬度 緯度 위도";
 
 /// Names of x, y and z, the likeliest first. Whatever letters a country's surveyors use, x is east and y is north.
 pub(super) const AXES: [&[&str]; 3] = [

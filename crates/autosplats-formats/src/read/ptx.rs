@@ -250,7 +250,8 @@ impl Records {
         tokens.extend([Token::Store(Scalar::F32); 3].into_iter().take(if has_color { 3 } else { 0 }));
         let stride: usize = tokens.iter().map(|token| token.size()).sum();
         job.check_memory(scan.count, 2 * stride)?;
-        let short = Short::new(width.saturating_sub(3));
+        // Numbers of nothing but set bits are not numbers.
+        let short = Short::new(width.saturating_sub(3), u8::MAX);
         let rows = Rows { tokens: &tokens, count: Some(scan.count), may_be_cut: false };
         let own = Job { bytes: &job.bytes[..scan.points.end], ..*job };
         let (bytes, count) = if has_color {
@@ -315,9 +316,10 @@ impl Records {
 
     fn color(&self, point: usize, scale: ColorScale) -> [u8; 3] {
         // Grey, if other scans have colours.
-        let Some(at) = self.color else { return [GREY; 3] };
-        let color = [at, at + 4, at + 8].map(|at| self.number(point, at));
-        if color[0].is_nan() { [GREY; 3] } else { color.map(|value| scale.byte(value.into())) }
+        self.color.map_or([GREY; 3], |at| {
+            let rgb = [at, at + 4, at + 8].map(|at| f64::from(self.number(point, at)));
+            if rgb[0].is_nan() { [GREY; 3] } else { rgb.map(|value| scale.byte(value)) }
+        })
     }
 }
 

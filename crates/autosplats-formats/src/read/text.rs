@@ -304,6 +304,11 @@ pub(super) fn values(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|byte| matches!(byte, b' ' | b'\t' | b',' | b';' | b'\r')).filter(|value| !value.is_empty())
 }
 
+/// Whether a value is a colour packed into 32 bits.
+pub(super) fn is_packed_color(name: &str, scalar: Scalar) -> bool {
+    scalar.size() == 4 && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase())
+}
+
 /// A line without the blanks around it, and without a byte order mark.
 pub(super) fn trim(line: &[u8]) -> &[u8] {
     without_mark(line.trim_ascii()).trim_ascii_start()
@@ -313,11 +318,6 @@ pub(super) fn trim(line: &[u8]) -> &[u8] {
 #[inline]
 pub(super) fn without_mark(line: &[u8]) -> &[u8] {
     line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line)
-}
-
-/// Whether a value is a colour packed into 32 bits.
-pub(super) fn is_packed_color(name: &str, scalar: Scalar) -> bool {
-    scalar.size() == 4 && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase())
 }
 
 /// Whether a trimmed line is empty or a comment.
