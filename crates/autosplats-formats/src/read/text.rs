@@ -70,15 +70,16 @@ pub(super) struct Rows<'a> {
     pub(super) may_be_cut: bool,
 }
 
-/// Rows that end early: after how many values, and how many there are. The floats that they lack are NaN.
+/// Rows that end early: after how many values, the byte that fills the rest of their records, and how many there are.
 pub(super) struct Short {
     values: usize,
+    fill: u8,
     rows: AtomicUsize,
 }
 
 impl Short {
-    pub(super) fn new(values: usize) -> Self {
-        Self { values, rows: AtomicUsize::new(0) }
+    pub(super) fn new(values: usize, fill: u8) -> Self {
+        Self { values, fill, rows: AtomicUsize::new(0) }
     }
 
     /// Number of such rows so far.
@@ -221,8 +222,7 @@ impl Rows<'_> {
                 let rest = self.tokens[index..].iter().map(|token| token.size()).sum::<usize>();
                 return match short.filter(|short| short.values == index) {
                     Some(short) => {
-                        // All bits of the filling are set, which is NaN in floats of any size.
-                        record.resize(record.len() + rest, u8::MAX);
+                        record.resize(record.len() + rest, short.fill);
                         short.rows.fetch_add(1, Ordering::Relaxed);
                         Ok(())
                     }
