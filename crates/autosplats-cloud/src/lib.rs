@@ -13,6 +13,7 @@
 //! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
+mod axes;
 mod cloud;
 mod contents;
 mod crs;
@@ -30,9 +31,11 @@ mod progress;
 mod random;
 mod retain;
 mod sample;
+mod scale;
 mod thin;
 
-pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
+pub use axes::Axes;
+pub use cloud::{Field, FieldValues, PointCloud, Scan};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use error::{Error, excerpt, one_line};
@@ -48,3 +51,4 @@ pub use precision::{residual, sampled_middle, storage_origin};
 pub use progress::{Part, Progress};
 pub use random::Random;
 pub use sample::{SurfaceSamples, sample_surface};
+pub use scale::computing_scale_of;

@@ -46,9 +46,8 @@ impl Report {
         }
         if let Some(axes) = &self.axes {
             let about = match axes.name {
-                "z-up" => "z is up",
-                "y-up" => "y is up",
-                _ => "a camera's: x right, y down, z forward",
+                "camera" => "a camera's: x right, y down, z forward".into(),
+                name => name.replace('-', " is "),
             };
             fact("axes", format!("{about}{}", if axes.guessed { " (guessed from the shape)" } else { "" }));
         }

@@ -14,8 +14,14 @@ const INK: [u8; 4] = [240, 240, 240, 255];
 const SHADE: [u8; 4] = [24, 26, 30, 255];
 
 /// Draws the legend where it hides the least of the surface, at best in the middle of the right edge. A picture too
-/// small gets none. `offset` is added to the values of the scale.
-pub(super) fn draw(image: &mut Image, shading: &Shading, scale: &Scale, offset: f64, encode: impl Fn(f32) -> u8) {
+/// small gets none. `world` turns values of the scale into those of the world.
+pub(super) fn draw(
+    image: &mut Image,
+    shading: &Shading,
+    scale: &Scale,
+    world: impl Fn([f32; 2]) -> [f64; 2],
+    encode: impl Fn(f32) -> u8,
+) {
     let title = &shading.color.title();
     let [width, height] = [image.width as usize, image.height as usize];
     // Picture pixels per font pixel.
@@ -23,7 +29,9 @@ pub(super) fn draw(image: &mut Image, shading: &Shading, scale: &Scale, offset: 
     let line = (GLYPH + 4) * unit;
     let [low, high] = scale.range();
     let value = |i: usize| high + (low - high) * i as f32 / (LABELS - 1) as f32;
-    let labels: Vec<String> = (0..LABELS).map(|i| number((f64::from(value(i)) + offset) as f32, high - low)).collect();
+    let [world_low, world_high] = world([low, high]);
+    let width_of_range = (world_high - world_low) as f32;
+    let labels: Vec<String> = (0..LABELS).map(|i| number(world([value(i); 2])[0] as f32, width_of_range)).collect();
     let text_width = labels.iter().map(String::len).chain([title.chars().count()]).max().unwrap_or(0) * GLYPH * unit;
     let bar_width = 14 * unit;
     let panel_width = bar_width + text_width + 5 * line / 2;

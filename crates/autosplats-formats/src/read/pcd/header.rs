@@ -134,7 +134,7 @@ impl Header {
                     }
                 },
                 "#" if values.first().is_some_and(|word| word == "axes") => {
-                    axes = values.get(1).and_then(|word| axes_of(word)).or(axes);
+                    axes = values.get(1).and_then(|word| Axes::from_name(word)).or(axes);
                 }
                 "#" if values == ["sensor", "at", "VIEWPOINT"] => knows_sensor = true,
                 word if word.starts_with('#') => {}
@@ -176,15 +176,6 @@ impl Header {
             .iter()
             .try_fold(0_usize, |sum, field| sum.checked_add(field.scalar.size().checked_mul(field.count)?))
     }
-}
-
-fn axes_of(word: &str) -> Option<Axes> {
-    Some(match word {
-        "z-up" => Axes::ZUp,
-        "y-up" => Axes::YUp,
-        "camera" => Axes::Camera,
-        _ => return None,
-    })
 }
 
 fn scalar_of(kind: &str, size: &str) -> Option<Scalar> {
