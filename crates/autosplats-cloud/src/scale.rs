@@ -9,8 +9,8 @@ const SIZE_SAMPLES: usize = 1 << 10;
 /// Powers of two of lengths that are computed with as they are: 6e-8 to 3e7 units.
 const ORDINARY_EXPONENTS: std::ops::Range<i32> = -24..25;
 
-/// Factor that brings a length to a size at which its fourth power is exact enough in `f32`. The factor is 1 for 0 and for
-/// lengths of 6e-8 to 3e7, and otherwise the power of two that brings the length to between 1 and 2.
+/// Factor that brings a length to a size at which its fourth power is exact enough in `f32`. The factor is 1 for 0 and
+/// for lengths of 6e-8 to 3e7, and otherwise the power of two that brings the length to between 1 and 2.
 ///
 /// ```
 /// use autosplats_cloud::computing_scale_of;
@@ -27,8 +27,8 @@ pub fn computing_scale_of(length: f64) -> f64 {
 
 impl PointCloud {
     /// Factor that brings the cloud to a size at which fourth powers of its lengths are exact enough in `f32`: that of
-    /// the distance from the middle that half of the points do not exceed; see [`computing_scale_of`]. Multiplying by it
-    /// rounds nothing.
+    /// the distance from the middle that half of the points do not exceed; see [`computing_scale_of`]. Multiplying by
+    /// it rounds nothing.
     ///
     /// # Examples
     ///

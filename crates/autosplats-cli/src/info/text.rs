@@ -117,7 +117,7 @@ impl Report {
 
     fn shown_size(&self, bounds: &Bounds) -> String {
         let decimals = self.decimals(bounds);
-        let [x, y, z] = [0, 1, 2].map(|axis| format!("{:.*}", decimals[axis], bounds.size[axis]));
+        let [x, y, z] = [0, 1, 2].map(|axis| number(bounds.size[axis], decimals[axis]));
         let metric = self.crs.metres_per_unit.filter(|metres| *metres != 1.0);
         let metric = metric.map_or_else(String::new, |metres| {
             let [x, y, z] = bounds.size.map(|size| short(size * metres));

@@ -31,8 +31,8 @@ pub(super) fn samples(cloud: &PointCloud, axes: [DVec3; 3], most: usize) -> Vec<
 }
 
 /// The main body of some points, with its range along each axis. Single points further than `reach` core radii from the
-/// middle are left out, and then the few outermost along each axis that stick out. A ball filled evenly reaches 1.1 core
-/// radii, a rod 1.34, a square 1.45.
+/// middle are left out, and then the few outermost along each axis that stick out. A ball filled evenly reaches 1.1
+/// core radii, a rod 1.34, a square 1.45.
 pub(super) fn main_body(points: Vec<DVec3>, reach: f64) -> (Vec<DVec3>, [[f64; 2]; 3]) {
     let mut points = without_strays(points, reach);
     let ranges = [0, 1, 2].map(|axis| robust_range(&points, axis));

@@ -63,10 +63,10 @@ const EYE_HEIGHT_RATIO: f64 = 0.47;
 #[non_exhaustive]
 pub enum ViewDirection {
     /// Chosen from the data. Points in a camera's frame, in perspective, are seen from the camera. A scan that is far
-    /// denser near its sensor, as of a lidar on a car, is seen from behind and above the sensor. This needs perspective.
-    /// Several sensors count as one in their middle. An unknown sensor is assumed at the origin if the cloud
-    /// has no coordinate system. Points that sensors saw from one side are seen from half right of and above that side.
-    /// All else as [`Iso`](Self::Iso).
+    /// denser near its sensor, as of a lidar on a car, is seen from behind and above the sensor. This needs
+    /// perspective. Several sensors count as one in their middle. An unknown sensor is assumed at the origin if the
+    /// cloud has no coordinate system. Points that sensors saw from one side are seen from half right of and above that
+    /// side. All else as [`Iso`](Self::Iso).
     #[default]
     Auto,
     /// From the front, half right and above.

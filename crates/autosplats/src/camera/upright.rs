@@ -4,9 +4,9 @@
 //! A body stands on a flat end. An end is flat if the points in a thin slab there spread over much of what is seen of
 //! the body along that axis, and spread no less in a thinner slab. The slab's convex hull finds feet and open rims, the
 //! cells that it fills find closed bases. The two are multiplied, because three points that touch a plane by chance
-//! have a wide hull and fill nothing. A round end spreads in proportion to the thickness of the slab, so its flatness is
-//! 0. Points much flatter than wide, in one layer, are a scene seen from above or from a sensor. Their ground is below
-//! the rest.
+//! have a wide hull and fill nothing. A round end spreads in proportion to the thickness of the slab, so its flatness
+//! is 0. Points much flatter than wide, in one layer, are a scene seen from above or from a sensor. Their ground is
+//! below the rest.
 
 use autosplats_cloud::{Axes, Crs, PointCloud, Unit};
 use glam::{DVec2, DVec3};
@@ -38,8 +38,8 @@ const SURE_FLATNESS: f64 = 0.5;
 const MIN_FLATNESS: f64 = 0.02;
 /// Factor on the flatness of ends on which a body stands with Y or Z up. An L, as a wall and its pavement, has two.
 const CUSTOMARY: f64 = 1.2;
-/// A body that can stand on both ends: the less flat end has at least these shares of the hull and of the flatness of the
-/// flatter one, and consists of feet. An example is a table on its legs.
+/// A body that can stand on both ends: the less flat end has at least these shares of the hull and of the flatness of
+/// the flatter one, and consists of feet. An example is a table on its legs.
 const FEET_HULL_SHARE: f64 = 0.6;
 const FEET_FLATNESS_SHARE: f64 = 0.08;
 /// Least height over length of such a body. In flatter scenes, places where walls end look like feet.

@@ -112,8 +112,8 @@ pub enum Backend {
     Gpu,
 }
 
-/// Renders clouds into pictures. A renderer keeps its buffers, so that frames after the first allocate very little. A
-/// cloud whose coordinates are extraordinarily large or small, beyond about 1e7 or 1e-7, is copied once.
+/// Renders clouds into pictures. A renderer keeps its buffers, so that frames after the first allocate very little; of
+/// a cloud much larger than 1e7 units or smaller than 1e-7 it keeps a copy.
 ///
 /// # Examples
 ///
@@ -167,13 +167,9 @@ impl Default for Renderer {
 }
 
 impl Renderer {
-    fn of(form: BackendRenderer) -> Self {
-        Self { form, scaling: Scaling::default() }
-    }
-
     /// Creates a renderer that runs on the CPU, in the current rayon thread pool.
     pub fn new() -> Self {
-        Self::of(BackendRenderer::Cpu(Box::default()))
+        Self::from(BackendRenderer::Cpu(Box::default()))
     }
 
     /// Creates a renderer that runs on `backend`, on a device of its own.
@@ -182,7 +178,7 @@ impl Renderer {
     /// [`Error::Device`] if [`Backend::Gpu`] is requested and there is no GPU or it does not start;
     /// [`Error::DeviceMemory`].
     pub fn with_backend(backend: Backend) -> Result<Self, Error> {
-        let on = |gpu: Gpu| Ok(Self::of(BackendRenderer::Gpu(Box::new(GpuRenderer::new(gpu)?))));
+        let on = |gpu: Gpu| Ok(Self::from(BackendRenderer::Gpu(Box::new(GpuRenderer::new(gpu)?))));
         match backend {
             Backend::Cpu => Ok(Self::new()),
             Backend::Gpu => Gpu::new().and_then(on),
@@ -218,7 +214,7 @@ impl Renderer {
     /// # }
     /// ```
     pub fn with_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
-        Ok(Self::of(BackendRenderer::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?))))
+        Ok(Self::from(BackendRenderer::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?))))
     }
 
     /// Creates another renderer in the same place: on the CPU, or on the same device. On a device the two share the
@@ -241,7 +237,7 @@ impl Renderer {
         match &self.form {
             BackendRenderer::Cpu(_) => Ok(Self::new()),
             BackendRenderer::Gpu(renderer) => {
-                Ok(Self::of(BackendRenderer::Gpu(Box::new(GpuRenderer::new(renderer.device().clone())?))))
+                Ok(Self::from(BackendRenderer::Gpu(Box::new(GpuRenderer::new(renderer.device().clone())?))))
             }
         }
     }
@@ -371,37 +367,6 @@ impl Renderer {
             return Err(Error::Normals { what, given, points });
         }
         self.render_form(cloud, Some(GivenPlanes { normals, curvature, radius }), camera, size, settings, &|| true)
-    }
-
-    /// Renders a cloud at an ordinary size, with planes only on the CPU.
-    fn render_form(
-        &mut self,
-        cloud: &PointCloud,
-        given: Option<GivenPlanes<'_>>,
-        camera: &Camera,
-        size: [u32; 2],
-        settings: &Settings,
-        go_on: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Frame<'_>, Error> {
-        let Self { form, scaling } = self;
-        scaling.choose(cloud, Some(camera));
-        let (shown, camera, settings) = (scaling.cloud(cloud), scaling.camera(camera), scaling.settings(settings));
-        let unit = scaling.unit();
-        let frame = match (form, given) {
-            (BackendRenderer::Cpu(renderer), Some(given)) => {
-                let radius: Vec<f32> = given.radius.iter().map(|&radius| scaling.length(radius)).collect();
-                let given = Some(GivenPlanes { radius: &radius, ..given });
-                renderer.render(shown, &camera, size, &settings, given, unit, go_on)
-            }
-            (BackendRenderer::Cpu(renderer), None) => {
-                renderer.render(shown, &camera, size, &settings, None, unit, go_on)
-            }
-            (BackendRenderer::Gpu(renderer), None) => renderer.render(shown, &camera, size, &settings, unit, go_on),
-            (BackendRenderer::Gpu(_), Some(_)) => {
-                Err(Error::Device("precomputed normals are rendered on the CPU only".into()))
-            }
-        }?;
-        Ok(scaling.frame(frame))
     }
 
     /// Surfels of the last frame: the fits of all reconstructed points whose surfel's centre is in the picture, in no

@@ -1,15 +1,17 @@
 //! Frames of clouds of extraordinary size, computed at an ordinary one.
 //!
-//! The stages compute with squares and higher powers of lengths in `f32`, which overflow for clouds in units of 1e10 and
-//! vanish in units of 1e-12. Such a cloud is copied and multiplied by a power of two, which rounds nothing. All others
-//! are rendered as they are.
+//! The stages compute with squares and higher powers of lengths in `f32`, which overflow for clouds in units of 1e10
+//! and vanish in units of 1e-12. Such a cloud is copied and multiplied by a power of two, which rounds nothing. All
+//! others are rendered as they are.
 
 use std::borrow::Cow;
 
 use autosplats_cloud::{PointCloud, computing_scale_of};
 
-use super::{Frame, PointSurfel, Settings};
+use super::{BackendRenderer, Frame, PointSurfel, Renderer, Settings};
+use crate::Error;
 use crate::camera::{Camera, Projection};
+use crate::fit::GivenPlanes;
 use crate::search::SearchEngine;
 use crate::splat::GBuffer;
 
@@ -113,12 +115,51 @@ impl Scaling {
     }
 }
 
+impl From<BackendRenderer> for Renderer {
+    fn from(form: BackendRenderer) -> Self {
+        Self { form, scaling: Scaling::default() }
+    }
+}
+
+impl Renderer {
+    /// Renders a cloud at an ordinary size, with planes only on the CPU.
+    pub(super) fn render_form(
+        &mut self,
+        cloud: &PointCloud,
+        given: Option<GivenPlanes<'_>>,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: &Settings,
+        go_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Frame<'_>, Error> {
+        let Self { form, scaling } = self;
+        scaling.choose(cloud, Some(camera));
+        let (shown, camera, settings) = (scaling.cloud(cloud), scaling.camera(camera), scaling.settings(settings));
+        let unit = scaling.unit();
+        let frame = match (form, given) {
+            (BackendRenderer::Cpu(renderer), Some(given)) => {
+                let radius: Vec<f32> = given.radius.iter().map(|&radius| scaling.length(radius)).collect();
+                let given = Some(GivenPlanes { radius: &radius, ..given });
+                renderer.render(shown, &camera, size, &settings, given, unit, go_on)
+            }
+            (BackendRenderer::Cpu(renderer), None) => {
+                renderer.render(shown, &camera, size, &settings, None, unit, go_on)
+            }
+            (BackendRenderer::Gpu(renderer), None) => renderer.render(shown, &camera, size, &settings, unit, go_on),
+            (BackendRenderer::Gpu(_), Some(_)) => {
+                Err(Error::Device("precomputed normals are rendered on the CPU only".into()))
+            }
+        }?;
+        Ok(scaling.frame(frame))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use autosplats_cloud::glam::DVec3;
 
     use super::*;
-    use crate::{ColorMode, Renderer, test_clouds};
+    use crate::{ColorMode, test_clouds};
 
     /// A picture of a plane with a field of points before it, all lengths multiplied by `unit`.
     fn rendered(unit: f64, projection: Projection, color: ColorMode) -> (Vec<[u8; 4]>, GBuffer, Vec<PointSurfel>, f64) {
