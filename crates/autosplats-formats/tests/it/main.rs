@@ -2,8 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
+mod choosing;
 mod common;
+mod depth_images;
 mod e57;
+mod field_text;
 mod formats;
 mod gltf;
 mod hostile;
@@ -11,6 +14,7 @@ mod las;
 mod las_writing;
 mod losses;
 mod meshes;
+mod oddities;
 mod progress;
 mod ptx;
 mod real_files;

@@ -172,9 +172,9 @@ pub fn estimate_normals(
 /// where [`Normals`] are NaN. Any k is allowed.
 ///
 /// # Errors
-/// [`Error::TooManyPoints`].
-pub(crate) fn exact_k_radii(cloud: &PointCloud, k: u32) -> Result<Vec<f32>, Error> {
-    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, &())?;
+/// [`Error::TooManyPoints`], and [`Error::Cancelled`] if `progress` says so.
+pub(crate) fn exact_k_radii(cloud: &PointCloud, k: u32, progress: &dyn Progress) -> Result<Vec<f32>, Error> {
+    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, progress)?;
     // The radius of points that are not finite is not either.
     let finite = radius.iter().filter(|radius| radius.is_finite()).count() as u32;
     let of_density = 0.5 * (k.min(finite.saturating_sub(1)).max(1) as f32).sqrt();

@@ -19,6 +19,7 @@ use crate::Error;
 use crate::adapt::DepthNoise;
 use crate::adapt::gpu::DepthNoiseBuffer;
 use crate::camera::{Camera, PlacedView, View};
+use crate::cancel::NEVER;
 use crate::fit::Surfel;
 use crate::fit::orient::Sensors;
 use crate::fit::orient::gpu::{sensor_buffer, write_sensors};
@@ -148,7 +149,7 @@ impl GpuRenderer {
             self.cloud.resize(&self.gpu, cloud.len())?;
             self.uploader.positions(&self.gpu, cloud, &self.cloud, &|done| report(part * done))?;
             self.upload_sensors(&Sensors::new(cloud))?;
-            if self.depth_noise.write(&self.gpu, &DepthNoise::new(cloud))? {
+            if self.depth_noise.write(&self.gpu, &DepthNoise::new(cloud, &NEVER))? {
                 self.prepared = None;
             }
             self.resident.points = points;
@@ -241,7 +242,8 @@ impl GpuRenderer {
         } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let exposure = exposure.of(cloud, &settings.shading);
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure };
+        let values = wanted.scalar(cloud).map(|values| values.about()).unwrap_or_default();
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (PlacedView { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
         prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform);
@@ -269,6 +271,7 @@ impl GpuRenderer {
                 [_, _, _, surface, cover, extras] => prepared.layers.to_host(screen.margin, surface, cover, extras),
                 _ => GBuffer::default(),
             };
+            layers.scalar_about = values;
             (counters, value_range)
         })?;
         let waited_ms = waited.elapsed().as_secs_f64() * 1e3;
@@ -322,7 +325,8 @@ impl GpuRenderer {
         let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let exposure = exposure.of(cloud, &settings.shading);
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure };
+        let values = wanted.scalar(cloud).map(|values| values.about()).unwrap_or_default();
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (PlacedView { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
         prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform.into_format(texture.format()));

@@ -30,9 +30,12 @@ pub(super) fn draw(
     let [low, high] = scale.range();
     let value = |i: usize| high + (low - high) * i as f32 / (LABELS - 1) as f32;
     let [world_low, world_high] = world([low, high]);
-    let width_of_range = (world_high - world_low) as f32;
-    let labels: Vec<String> = (0..LABELS).map(|i| number(world([value(i); 2])[0] as f32, width_of_range)).collect();
-    let text_width = labels.iter().map(String::len).chain([title.chars().count()]).max().unwrap_or(0) * GLYPH * unit;
+    // A single value stands at the middle of the bar.
+    let places = if high > low { 0..LABELS } else { LABELS / 2..LABELS / 2 + 1 };
+    let label = |i: usize| (i, number(world([value(i); 2])[0], world_high - world_low));
+    let labels: Vec<(usize, String)> = places.map(label).collect();
+    let text_width =
+        labels.iter().map(|(_, label)| label.len()).chain([title.chars().count()]).max().unwrap_or(0) * GLYPH * unit;
     let bar_width = 14 * unit;
     let panel_width = bar_width + text_width + 5 * line / 2;
     let bar_height = height / 2;
@@ -58,7 +61,7 @@ pub(super) fn draw(
         let [r, g, b] = scale.color(low + (high - low) * t).map(&encode);
         image.pixels[(top + y) * width + x..][..bar_width].fill([r, g, b, 255]);
     }
-    for (i, label) in labels.iter().enumerate() {
+    for (i, label) in &labels {
         let y = top + (bar_height - 1) * i / (LABELS - 1);
         image.pixels[y * width + x + bar_width..][..3 * unit].fill(INK);
         text(image, label, [x + bar_width + 5 * unit, y - GLYPH * unit / 2], unit);
@@ -74,13 +77,17 @@ fn hidden(image: &Image, behind: Background, [x0, y0]: [usize; 2], [width, heigh
     (y0..y0 + height).map(count).sum()
 }
 
-/// A value with the digits needed within a range of this width.
-fn number(value: f32, range: f32) -> String {
+/// A value with the digits that tell hundredths of a range of this width apart.
+fn number(value: f64, range: f64) -> String {
     let largest = value.abs().max(range);
-    if largest != 0.0 && !(1e-4..1e7).contains(&largest) {
-        return format!("{value:.2e}");
+    let part = if range > 0.0 { range / largest } else { 1.0 };
+    // Large values that differ in their last digits only are read more easily without an exponent.
+    let long = 1e7 <= largest && part < 1e-3 || range == 0.0;
+    if largest != 0.0 && !(1e-4..if long { 1e15 } else { 1e7 }).contains(&largest) {
+        let digits = (2.0 - part.log10()).round().clamp(2.0, 15.0) as usize;
+        return format!("{value:.digits$e}");
     }
-    let digits = if range > 0.0 { (2.0 - range.log10()).ceil().clamp(0.0, 6.0) as usize } else { 3 };
+    let digits = if range > 0.0 { (2.0 - range.log10()).ceil().clamp(0.0, 12.0) as usize } else { 3 };
     format!("{value:.digits$}")
 }
 
@@ -115,5 +122,11 @@ mod tests {
         assert_eq!(number(0.0312, 0.05), "0.0312", "small values");
         assert_eq!(number(3e-9, 5e-9), "3.00e-9", "tiny values");
         assert_eq!(number(7.0, 0.0), "7.000", "no range");
+        assert_eq!(number(3.0e8, 2.0e8), "3.00e8", "large values of a large range");
+        assert_eq!(number(1_700_000_123.25, 60.0), "1700000123.2", "seconds of an era");
+        assert_eq!(number(300_000_000.123_456, 2e-3), "300000000.12346", "parts of seconds");
+        assert_eq!(number(0.1, 1e-7), "0.100000000", "nearly one value");
+        assert_eq!(number(3e-9, 1e-12), "3.00000e-9", "tiny values of a small range");
+        assert_eq!(number(0.0, 0.0), "0.000", "nothing");
     }
 }

@@ -10,6 +10,7 @@ mod extremes;
 mod first_view;
 mod kd_tree;
 mod properties;
+mod ranges;
 mod sensors;
 mod smoothing;
 mod surfels;
