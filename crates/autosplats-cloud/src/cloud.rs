@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::{DMat4, DVec3};
 
-use crate::{Crs, Error, identity::Identity};
+use crate::{Axes, Crs, Error, identity::Identity};
 
 /// Points of one frame: positions and the attributes that the scanner recorded.
 ///
@@ -72,18 +72,6 @@ impl Scan {
     pub fn position(&self) -> DVec3 {
         self.world_from_sensor.w_axis.truncate()
     }
-}
-
-/// Which axis points up, and from where a viewer looks first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Axes {
-    /// Z up, seen first from -Y. Usual for surveys and robots.
-    ZUp,
-    /// Y up, seen first from +Z. Usual for models.
-    YUp,
-    /// A camera's own frame: x right, y down, z forward. The points were seen from the origin and look right only from
-    /// there.
-    Camera,
 }
 
 /// A named scalar attribute with one value per point.

@@ -13,6 +13,7 @@
 //! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
+mod axes;
 mod classes;
 mod cloud;
 mod contents;
@@ -33,10 +34,12 @@ mod progress;
 mod random;
 mod retain;
 mod sample;
+mod scale;
 mod thin;
 
+pub use axes::Axes;
 pub use classes::class_name;
-pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
+pub use cloud::{Field, FieldValues, PointCloud, Scan};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use encoding::{Unmarked, read_text};
@@ -56,3 +59,4 @@ pub use precision::{
 pub use progress::{Part, Progress};
 pub use random::Random;
 pub use sample::{SurfaceSamples, sample_surface};
+pub use scale::computing_scale_of;

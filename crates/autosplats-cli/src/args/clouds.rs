@@ -120,7 +120,7 @@ occur. Later versions may add fields.
   points_in_header  number of points that the header states
   faces             number of faces of a mesh
   bounds            smallest and largest coordinates: {min: [x, y, z], max: [...], size: [...]}
-  axes              {name: z-up, y-up or camera, guessed: true if from the cloud's shape}
+  axes              {name: such as z-up, y-down or camera, guessed: true if from the shape}
   crs               {name, epsg, wkt, unit, vertical_unit, metres_per_unit}, as the file states
   resolution        step that coordinates are multiples of: [x, y, z]
   spacing           distance to the nearest other point, at up to 10,000 points spread over

@@ -49,9 +49,8 @@ impl Report {
         }
         if let Some(axes) = &self.axes {
             let about = match axes.name {
-                "z-up" => "z is up",
-                "y-up" => "y is up",
-                _ => "a camera's: x right, y down, z forward",
+                "camera" => "a camera's: x right, y down, z forward".into(),
+                name => name.replace('-', " is "),
             };
             fact("axes", format!("{about}{}", if axes.guessed { " (guessed from the shape)" } else { "" }));
         }
@@ -122,7 +121,7 @@ impl Report {
 
     fn shown_size(&self, bounds: &Bounds) -> String {
         let decimals = self.decimals(bounds);
-        let [x, y, z] = [0, 1, 2].map(|axis| format!("{:.*}", decimals[axis], bounds.size[axis]));
+        let [x, y, z] = [0, 1, 2].map(|axis| number(bounds.size[axis], decimals[axis]));
         let metric = self.crs.metres_per_unit.filter(|metres| *metres != 1.0);
         let metric = metric.map_or_else(String::new, |metres| {
             let [x, y, z] = bounds.size.map(|size| short(size * metres));

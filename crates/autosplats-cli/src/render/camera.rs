@@ -44,6 +44,10 @@ impl CameraJob {
             AxesChoice::Auto => None,
             AxesChoice::ZUp => Some(Axes::ZUp),
             AxesChoice::YUp => Some(Axes::YUp),
+            AxesChoice::XUp => Some(Axes::XUp),
+            AxesChoice::ZDown => Some(Axes::ZDown),
+            AxesChoice::YDown => Some(Axes::YDown),
+            AxesChoice::XDown => Some(Axes::XDown),
             AxesChoice::Camera => Some(Axes::Camera),
         };
         let place = match (&args.camera, args.eye) {
@@ -143,12 +147,8 @@ fn direction(side: Option<Side>) -> ViewDirection {
 
 /// Up direction of a picture along `sight`: the axes' up, or their forward direction if up is along the line of sight.
 fn upward(axes: Axes, sight: DVec3) -> DVec3 {
-    let (up, ahead) = match axes {
-        Axes::ZUp => (DVec3::Z, DVec3::Y),
-        Axes::YUp => (DVec3::Y, DVec3::NEG_Z),
-        Axes::Camera => (DVec3::NEG_Y, DVec3::Z),
-    };
-    if sight.cross(up).length() > 1e-6 * sight.length() { up } else { ahead }
+    let [_, front, up] = axes.frame();
+    if sight.cross(up).length() > 1e-6 * sight.length() { up } else { -front }
 }
 
 fn load(path: &Path, console: &Console) -> Result<Camera, Failure> {

@@ -28,15 +28,23 @@ pub(crate) struct State {
     clock: Option<Clock>,
 }
 
-/// The up axis.
+/// The up axis, stored as its name.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-enum Up {
-    #[serde(rename = "z_up")]
-    Z,
-    #[serde(rename = "y_up")]
-    Y,
-    #[serde(rename = "camera")]
-    Camera,
+#[serde(try_from = "String", into = "String")]
+struct Up(Axes);
+
+impl TryFrom<String> for Up {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        Axes::from_name(&name).map(Self).ok_or_else(|| format!("no axes are called '{name}'"))
+    }
+}
+
+impl From<Up> for String {
+    fn from(Up(axes): Up) -> Self {
+        axes.name().into()
+    }
 }
 
 impl State {
@@ -52,16 +60,11 @@ impl State {
         // Points from a pipe cannot be read again.
         let again = |kept: &StoredInput| !matches!(Source::parse(&kept.source), Ok(Source::StandardInput));
         let inputs: Vec<StoredInput> = layers.chain(absent).filter(again).collect();
-        let up = session.up_axis.map(|axes| match axes {
-            Axes::ZUp => Up::Z,
-            Axes::YUp => Up::Y,
-            Axes::Camera => Up::Camera,
-        });
         Self {
             camera: (!inputs.is_empty()).then(|| view.navigation.goal_camera()),
             clock: inputs.iter().any(StoredInput::moves).then(|| session.playing.clock.clone()),
             inputs,
-            up,
+            up: session.up_axis.map(Up),
             look: view.look.clone(),
             keys: view.keys.clone(),
             clip: session.document().clip,
@@ -111,11 +114,7 @@ impl State {
         let Self { inputs, camera, up, look, keys, clip, clock } = self;
         view.look = look;
         view.keys = keys;
-        session.up_axis = up.map(|up| match up {
-            Up::Z => Axes::ZUp,
-            Up::Y => Axes::YUp,
-            Up::Camera => Axes::Camera,
-        });
+        session.up_axis = up.map(|Up(axes)| axes);
         if clip.is_some() {
             session.settle(|document| document.clip = clip);
         }
@@ -168,7 +167,7 @@ mod tests {
         let state = State { inputs, up: Some(Up::Y), clip: Some(clip), clock: Some(clock), ..State::default() };
         state.write(&path).expect("written");
         assert_eq!(State::read(&path), Ok(state), "as it was");
-        let older = r#"{"inputs": [{"source": "a.ply"}], "camera": null, "up": "z_up", "keys": []}"#;
+        let older = r#"{"inputs": [{"source": "a.ply"}], "camera": null, "up": "z-up", "keys": []}"#;
         std::fs::write(&path, older).expect("written");
         let read = State::read(&path).expect("a file from before there were boxes, options and clocks");
         assert_eq!((read.clip, read.clock), (None, None), "none were told");

@@ -70,7 +70,8 @@ impl CpuRenderer {
         self.view.as_ref().map_or_else(Vec::new, |view| point_surfels(&self.surfels, view))
     }
 
-    /// See [`Renderer::render_while`](super::Renderer::render_while). The planes in `given` replace search and fit.
+    /// See [`Renderer::render_while`](super::Renderer::render_while). The planes in `given` replace search and fit. A
+    /// unit of the cloud is `unit` world units.
     pub(super) fn render(
         &mut self,
         cloud: &PointCloud,
@@ -78,6 +79,7 @@ impl CpuRenderer {
         size: [u32; 2],
         settings: &Settings,
         given: Option<GivenPlanes<'_>>,
+        unit: f64,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let picture = check(cloud, camera, size, settings)?;
@@ -85,7 +87,7 @@ impl CpuRenderer {
             Some(_) => Mode::Given,
             None => {
                 check_engine(settings.reconstruction.engine)?;
-                Mode::of(&settings.reconstruction, cloud, size)
+                Mode::of(&settings.reconstruction, cloud, &picture)
             }
         };
         let rules = Rules::new(&settings.reconstruction, mode, size, |_, _| true);
@@ -106,6 +108,7 @@ impl CpuRenderer {
             given,
             attributes,
             cancel: &cancel,
+            unit,
             picture,
             view: picture.with_margin(rules.margin_px),
             search_counts: SearchCounts::default(),
@@ -138,6 +141,8 @@ struct CpuFrame<'a> {
     given: Option<GivenPlanes<'a>>,
     attributes: Attributes<'a>,
     cancel: &'a Cancel<'a>,
+    /// World units per unit of the cloud.
+    unit: f64,
     /// View of the picture, without the margin.
     picture: View,
     /// View of the screen.
@@ -301,7 +306,14 @@ impl CpuFrame<'_> {
         let exposure = exposure.of(cloud, shading);
         let layers = splatter.last();
         let values = layers.scalar_about;
-        let scene = Scene { view: &self.picture, up: upward.of(cloud), origin: cloud.origin(), exposure, values };
+        let scene = Scene {
+            view: &self.picture,
+            up: upward.of(cloud),
+            origin: cloud.origin(),
+            unit: self.unit,
+            exposure,
+            values,
+        };
         let mut following = self.rules.averaged.map(|_| last_picture.following(self.picture));
         let cancel = self.cancel;
         let mut average =

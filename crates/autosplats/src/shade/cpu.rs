@@ -38,6 +38,8 @@ pub(crate) struct Scene<'a> {
     pub(crate) up: DVec3,
     /// The cloud's origin.
     pub(crate) origin: DVec3,
+    /// World units per unit of the view, of which the layers are too.
+    pub(crate) unit: f64,
     /// Factor on the brightness of the points' own colours.
     pub(crate) exposure: f32,
     /// What the values of the scalar field are relative to.
@@ -72,15 +74,21 @@ impl Scene<'_> {
         if high - low > noise { [low, high] } else { [low + 0.5 * (high - low); 2] }
     }
 
+    /// World units per unit of the values that shading computes with.
+    pub(super) fn value_unit(&self, mode: &ColorMode) -> f64 {
+        let is_length = matches!(mode, ColorMode::Height | ColorMode::Depth | ColorMode::Radius | ColorMode::KRadius);
+        if is_length { self.unit } else { 1.0 }
+    }
+
     /// The requested range, in values that shading computes with.
     pub(super) fn given_range(&self, shading: &Shading) -> Option<[f32; 2]> {
-        let offset = self.value_offset(&shading.color);
-        shading.range.map(|range| range.map(|end| (end - offset) as f32))
+        let (offset, unit) = (self.value_offset(&shading.color), self.value_unit(&shading.color));
+        shading.range.map(|range| range.map(|end| (end / unit - offset) as f32))
     }
 
     /// Converts a range of values that shading computes with to values of the world.
     pub(super) fn world_range(&self, mode: &ColorMode, range: [f32; 2]) -> [f64; 2] {
-        range.map(|end| f64::from(end) + self.value_offset(mode))
+        range.map(|end| (f64::from(end) + self.value_offset(mode)) * self.value_unit(mode))
     }
 }
 
@@ -126,7 +134,7 @@ pub(crate) fn shade(
     }
     if let (true, Some(scale)) = (shading.legend, &shader.scale) {
         let encode = |channel| encode(inks.table, channel);
-        legend::draw(image, shading, scale, scene.value_offset(&shading.color), encode);
+        legend::draw(image, shading, scale, |range| scene.world_range(&shading.color, range), encode);
     }
     shader.scale.as_ref().map(|scale| scene.world_range(&shading.color, scale.range()))
 }

@@ -14,8 +14,14 @@ const INK: [u8; 4] = [240, 240, 240, 255];
 const SHADE: [u8; 4] = [24, 26, 30, 255];
 
 /// Draws the legend where it hides the least of the surface, at best in the middle of the right edge. A picture too
-/// small gets none. `offset` is added to the values of the scale.
-pub(super) fn draw(image: &mut Image, shading: &Shading, scale: &Scale, offset: f64, encode: impl Fn(f32) -> u8) {
+/// small gets none. `world` turns values of the scale into those of the world.
+pub(super) fn draw(
+    image: &mut Image,
+    shading: &Shading,
+    scale: &Scale,
+    world: impl Fn([f32; 2]) -> [f64; 2],
+    encode: impl Fn(f32) -> u8,
+) {
     let title = &shading.color.title();
     let [width, height] = [image.width as usize, image.height as usize];
     // Picture pixels per font pixel.
@@ -23,9 +29,10 @@ pub(super) fn draw(image: &mut Image, shading: &Shading, scale: &Scale, offset: 
     let line = (GLYPH + 4) * unit;
     let [low, high] = scale.range();
     let value = |i: usize| high + (low - high) * i as f32 / (LABELS - 1) as f32;
+    let [world_low, world_high] = world([low, high]);
     // A single value stands at the middle of the bar.
     let places = if high > low { 0..LABELS } else { LABELS / 2..LABELS / 2 + 1 };
-    let label = |i: usize| (i, number(f64::from(value(i)) + offset, f64::from(high - low)));
+    let label = |i: usize| (i, number(world([value(i); 2])[0], world_high - world_low));
     let labels: Vec<(usize, String)> = places.map(label).collect();
     let text_width =
         labels.iter().map(|(_, label)| label.len()).chain([title.chars().count()]).max().unwrap_or(0) * GLYPH * unit;

@@ -6,6 +6,8 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 use autosplats::{Backend, Error, Renderer};
 
 mod backends;
+mod extremes;
+mod first_view;
 mod kd_tree;
 mod properties;
 mod ranges;

@@ -139,7 +139,7 @@ impl Header {
                     }
                 },
                 "#" if values.first().is_some_and(|word| word == "axes") => {
-                    axes = values.get(1).and_then(|word| axes_of(word)).or(axes);
+                    axes = values.get(1).and_then(|word| Axes::from_name(word)).or(axes);
                 }
                 "#" if values == ["sensor", "at", "VIEWPOINT"] => knows_sensor = true,
                 word if word.starts_with('#') => {}
@@ -233,15 +233,6 @@ fn after_extension(bytes: &[u8], start: usize, text: bool) -> usize {
 /// Whether a line begins with `nan` or `inf`.
 fn starts_with_number(line: &[u8]) -> bool {
     text::values(line).next().is_some_and(|value| text::number(value).is_ok())
-}
-
-fn axes_of(word: &str) -> Option<Axes> {
-    Some(match word {
-        "z-up" => Axes::ZUp,
-        "y-up" => Axes::YUp,
-        "camera" => Axes::Camera,
-        _ => return None,
-    })
 }
 
 fn scalar_of(kind: &str, size: &str) -> Option<Scalar> {

@@ -93,7 +93,7 @@ impl Header {
                 None | Some("obj_info") => {}
                 Some("comment") => {
                     if words.next() == Some("axes") {
-                        axes = words.next().and_then(axes_of).or(axes);
+                        axes = words.next().and_then(Axes::from_name).or(axes);
                     }
                 }
                 Some("format") => {
@@ -178,13 +178,4 @@ fn scalar_of(word: &str) -> Option<Scalar> {
         "double" | "float64" => Scalar::F64,
         _ => return None,
     })
-}
-
-fn axes_of(word: &str) -> Option<Axes> {
-    match word {
-        "z-up" => Some(Axes::ZUp),
-        "y-up" => Some(Axes::YUp),
-        "camera" => Some(Axes::Camera),
-        _ => None,
-    }
 }

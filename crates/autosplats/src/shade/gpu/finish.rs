@@ -47,8 +47,8 @@ pub(crate) fn finish(
     if shading.legend {
         let scale = Scale::new(shading.color_map.unwrap_or(map), range);
         let table = encode_table();
-        let offset = scene.value_offset(&shading.color);
-        legend::draw(image, shading, &scale, offset, |channel| encode(table, channel));
+        let world = |range| scene.world_range(&shading.color, range);
+        legend::draw(image, shading, &scale, world, |channel| encode(table, channel));
     }
     Some(scene.world_range(&shading.color, range))
 }

@@ -99,7 +99,14 @@ fn measure(name: &str, size: [u32; 2]) -> [Quality; 2] {
         let mut image = Image::default();
         shade(
             layers,
-            &Scene { view: &view, up: DVec3::Z, origin: DVec3::ZERO, exposure: 1.0, values: ValueOrigin::default() },
+            &Scene {
+                view: &view,
+                up: DVec3::Z,
+                origin: DVec3::ZERO,
+                unit: 1.0,
+                exposure: 1.0,
+                values: ValueOrigin::default(),
+            },
             &shading,
             true,
             None,
