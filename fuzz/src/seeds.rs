@@ -48,7 +48,8 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         seeds("ptx", vec![ptx()]),
         seeds("xyz", [written("xyz")?, vec![rows.clone().into_bytes()]].concat()),
         seeds("pts", [written("pts")?, vec![format!("{POINTS}\n{rows}").into_bytes()]].concat()),
-        seeds("csv", [written("csv")?, vec![odd_csv()]].concat()),
+        seeds("csv", [written("csv")?, vec![odd_csv(), grouped_csv()]].concat()),
+        seeds("grd", vec![grid()]),
         seeds("obj", vec![format!("# a\ng b\n{vertices}{}", faces("f", 1)).into_bytes(), odd_obj()]),
         seeds("off", vec![format!("OFF\n{POINTS} {} 0\n{positions}{}", POINTS - 2, faces("3", 0)).into_bytes()]),
         seeds("stl", vec![binary_stl(), text_stl()]),
@@ -215,6 +216,18 @@ fn ptx() -> Vec<u8> {
     b"2\n2\n10 20 30\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n10 20 30 1\n1 2 3 0.5\n0 0 0 0.5\n4 5 6 0.25\n\
       7 8 9 1\n1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 0.5 255 0 7\n4 5 6 0.5 1 2 3\n"
         .to_vec()
+}
+
+/// Words before and after the points, names in German, thousands, and a row without coordinates.
+fn grouped_csv() -> Vec<u8> {
+    let rows: String = (0..POINTS).map(|i| format!("P{i};5.401.233,{i};\"3 512 344,5\";{i},25\n")).collect();
+    format!("Project: a\nPunkt;Hochwert;Rechtswert;Höhe\n-;;NULL;N/A\n{rows}END\n").into_bytes()
+}
+
+/// A grid of heights with cells without data, whose rows wrap.
+fn grid() -> Vec<u8> {
+    let heights: String = (0..POINTS).map(|i| if i % 5 == 0 { "-9999\n".into() } else { format!("{i}.5 ") }).collect();
+    format!("ncols 6\nnrows 4\nXLLCENTER 10,5\nyllcorner 20\ndx 1\ndy 2\n{heights}").into_bytes()
 }
 
 fn odd_csv() -> Vec<u8> {

@@ -263,6 +263,12 @@ impl PointCloud {
         self.positions.is_empty()
     }
 
+    /// Whether at least `least` points have a finite position. Stops reading at the point that settles it.
+    pub fn has_finite(&self, least: usize) -> bool {
+        let finite = self.positions.iter().filter(|position| position.iter().all(|value| value.is_finite()));
+        finite.take(least).count() == least
+    }
+
     /// Identifies the cloud's points and attributes within this process. Clones share the number; changed points,
     /// colours, fields or scans get another. A cached copy, as on a graphics card, is outdated if the number differs.
     pub fn identity(&self) -> u64 {

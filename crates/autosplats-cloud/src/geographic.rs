@@ -1,4 +1,4 @@
-//! Degrees and feet to metres: pictures need equal units along all axes, and some files need metres.
+//! One unit along all axes: degrees and feet to metres, and heights to the unit of x and y.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -6,16 +6,13 @@ use rayon::prelude::*;
 use crate::{
     Crs, PointCloud, Unit,
     identity::Identity,
-    precision::{residual, sampled_middle},
+    precision::{degree_origin, residual},
 };
 
 /// Semi-major axis of the WGS 84 ellipsoid, in metres.
 const SEMI_MAJOR: f64 = 6_378_137.0;
 /// Squared eccentricity of the WGS 84 ellipsoid.
 const ECCENTRICITY_2: f64 = 6.694_379_990_141_316e-3;
-
-/// Steps per degree to which the map's centre is rounded; a step is about 11 cm.
-const STEPS_PER_DEGREE: f64 = 1e6;
 
 impl PointCloud {
     /// Converts to metres if x and y are longitude and latitude in [degrees](Unit::Degree), and returns whether they
@@ -35,7 +32,7 @@ impl PointCloud {
             return None;
         }
         let middle = beside.map_or_else(
-            || sampled_middle(self.len(), |i| self.world_position(i) * STEPS_PER_DEGREE) / STEPS_PER_DEGREE,
+            || degree_origin(self.len(), |i| self.world_position(i)),
             |LocalMetres { middle, .. }| *middle,
         );
         Some(LocalMetres::at(middle, self.crs.vertical_unit.and_then(Unit::metres).unwrap_or(1.0)))
@@ -76,6 +73,21 @@ impl PointCloud {
     /// Multiplies world coordinates by `scale`, in metres per unit. The coordinate system is dropped, because it has
     /// another unit. Sensors are moved but not rotated.
     pub fn scale_to_metres(&mut self, scale: DVec3) {
+        self.scale(scale);
+        self.crs = Crs { unit: Some(Unit::Metre), ..Crs::default() };
+    }
+
+    /// Converts heights to the unit of x and y, if both are lengths and differ. Returns whether they did. The
+    /// coordinate system loses its heights, because they have another unit. Sensors are moved but not rotated.
+    pub fn scale_heights(&mut self) -> bool {
+        let Some(scale) = self.crs.height_scale() else { return false };
+        self.scale(DVec3::new(1.0, 1.0, scale));
+        self.crs = std::mem::take(&mut self.crs).horizontal();
+        true
+    }
+
+    /// Multiplies world coordinates by `scale`. Residuals keep all digits.
+    fn scale(&mut self, scale: DVec3) {
         let world = |i: usize| self.world_position(i) * scale;
         let origin = (self.origin * scale).round();
         let positions = (0..self.len()).into_par_iter().map(|i| (world(i) - origin).as_vec3().to_array()).collect();
@@ -86,8 +98,16 @@ impl PointCloud {
             scan.world_from_sensor.w_axis = (scan.position() * scale).extend(1.0);
         }
         self.resolution = self.resolution.map(|step| step * scale);
-        self.crs = Crs { unit: Some(Unit::Metre), ..Crs::default() };
     }
+}
+
+/// Whether coordinates that state no unit look like longitude and latitude with heights in metres or feet: they are on
+/// the globe, and their box is more than `ratio` times higher than wide.
+pub fn looks_like_degrees([low, high]: [DVec3; 2], ratio: f64) -> bool {
+    let size = high - low;
+    let on_globe = low.x >= -180.0 && high.x <= 180.0 && low.y >= -90.0 && high.y <= 90.0;
+    let edge = size.x.max(size.y);
+    on_globe && edge > 0.0 && size.z > ratio * edge
 }
 
 /// A flat map that touches the ellipsoid at one place. It maps longitude and latitude to metres east and north of that
@@ -185,6 +205,33 @@ mod tests {
         let way = second.world_position(0) - first.world_position(0);
         assert!((way - DVec3::new(2151.0, 0.0, 2.0)).abs().max_element() < 1.0, "keeps its place: {way}");
         assert!(!first.to_metres_on(&local) && first.local_metres(None).is_none(), "metres stay");
+    }
+
+    #[test]
+    fn heights_get_the_unit_of_the_plane() {
+        let survey = 1200.0 / 3937.0;
+        for (unit, vertical_unit, scale) in [
+            (Unit::Metre, Unit::UsSurveyFoot, survey),
+            (Unit::Metre, Unit::Foot, 0.3048),
+            (Unit::Foot, Unit::Metre, 1.0 / 0.3048),
+            (Unit::Foot, Unit::UsSurveyFoot, survey / 0.3048),
+        ] {
+            let crs = Crs { unit: Some(unit), vertical_unit: Some(vertical_unit), ..Crs::default() };
+            let mut scaled = cloud(&[[5e5, 5e6, 1000.0], [5e5 + 1.0, 5e6, 1001.0]]).with_crs(crs);
+            let before = [0, 1].map(|i| scaled.world_position(i));
+            assert!(scaled.scale_heights(), "{unit:?}, {vertical_unit:?}");
+            for (i, before) in before.into_iter().enumerate() {
+                let expected = before * DVec3::new(1.0, 1.0, scale);
+                assert!(
+                    scaled.world_position(i).abs_diff_eq(expected, 1e-9),
+                    "{unit:?}, {vertical_unit:?}: every digit"
+                );
+            }
+            assert_eq!(scaled.crs(), &Crs { unit: Some(unit), ..Crs::default() }, "one unit");
+            assert!(!scaled.scale_heights(), "once");
+        }
+        let mut degrees = cloud(&[[8.5, 47.0, 400.0]]);
+        assert!(!degrees.scale_heights(), "no length is a degree");
     }
 
     #[test]

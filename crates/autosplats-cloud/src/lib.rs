@@ -13,12 +13,15 @@
 //! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
+mod classes;
 mod cloud;
 mod contents;
 mod crs;
+mod encoding;
 mod error;
 mod error_kind;
 mod files;
+mod filter;
 mod geographic;
 mod guard;
 mod identity;
@@ -32,19 +35,24 @@ mod retain;
 mod sample;
 mod thin;
 
+pub use classes::class_name;
 pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
+pub use encoding::{Unmarked, read_text};
 pub use error::{Error, excerpt, one_line};
 pub use error_kind::ErrorKind;
 pub use files::{Bytes, temporary_beside, write_whole};
-pub use geographic::LocalMetres;
+pub use filter::{LeftOut, PointFilter};
+pub use geographic::{LocalMetres, looks_like_degrees};
 /// Vector library of the public interface.
 pub use glam;
 pub use guard::guard;
 pub use memory::{available_memory, check_memory};
 pub use merge::normal_matrix;
-pub use precision::{RelativeValues, ValueOrigin, residual, sampled_middle, storage_origin};
+pub use precision::{
+    RelativeValues, ValueOrigin, degree_origin, residual, sampled_bounds, sampled_middle, storage_origin,
+};
 pub use progress::{Part, Progress};
 pub use random::Random;
 pub use sample::{SurfaceSamples, sample_surface};

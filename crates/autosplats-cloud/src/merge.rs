@@ -6,9 +6,9 @@ use glam::{DMat3, DMat4, DVec3};
 use rayon::prelude::*;
 
 use crate::{
-    Crs, Field, FieldValues, PointCloud, Scan, each_type,
+    Crs, Field, FieldValues, PointCloud, Scan, Unit, each_type,
     identity::Identity,
-    precision::{residual, storage_origin},
+    precision::{degree_origin, residual, storage_origin},
 };
 
 /// Colour of the points of a part without colours, if another part has colours.
@@ -178,7 +178,9 @@ fn common_origin(parts: &[(&PointCloud, DMat4)]) -> DVec3 {
         return first;
     }
     let far = parts.iter().find_map(|(cloud, pose)| {
-        let origin = storage_origin(cloud.len(), |i| pose.transform_point3(cloud.world_position(i)));
+        let world = |i| pose.transform_point3(cloud.world_position(i));
+        let degrees = cloud.crs().unit == Some(Unit::Degree);
+        let origin = if degrees { degree_origin(cloud.len(), world) } else { storage_origin(cloud.len(), world) };
         let own = *pose == DMat4::IDENTITY && cloud.origin() != DVec3::ZERO;
         (origin != DVec3::ZERO).then_some(if own { cloud.origin() } else { origin })
     });

@@ -17,6 +17,22 @@ pub fn storage_origin(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
     if middle.abs().max_element() < MAX_WITHOUT_ORIGIN { DVec3::ZERO } else { middle }
 }
 
+/// Parts of a degree to which the origin of points in degrees is rounded; a part is about 11 cm.
+const PARTS_PER_DEGREE: f64 = 1e6;
+
+/// The origin for points in degrees: their middle, to a millionth. At a whole number, one step of `f32` would be up to
+/// half a metre on the ground.
+pub fn degree_origin(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
+    sampled_middle(count, |i| world(i) * PARTS_PER_DEGREE) / PARTS_PER_DEGREE
+}
+
+/// The box of a sample of the points; `None` if no sampled point is finite.
+pub fn sampled_bounds(count: usize, world: impl Fn(usize) -> DVec3) -> Option<[DVec3; 2]> {
+    let step = count.div_ceil(MIDDLE_SAMPLES).max(1);
+    let sample = (0..count).step_by(step).map(world).filter(|point| point.is_finite());
+    sample.map(|point| [point; 2]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
+}
+
 /// A place of whole numbers in the middle of the points: the median of a sample. Outliers do not move a median as they
 /// move the centre of the bounds.
 pub fn sampled_middle(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {

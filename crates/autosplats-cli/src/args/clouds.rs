@@ -44,7 +44,7 @@ pub(crate) struct ThinningArgs {
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds, allow_hyphen_values = true)]
     pub(crate) bounds: Option<[DVec3; 2]>,
     /// Keep the first of every COUNT points
-    #[arg(long, value_name = "COUNT", value_parser = values::step)]
+    #[arg(long, value_name = "COUNT", value_parser = values::step, allow_negative_numbers = true)]
     pub(crate) every: Option<usize>,
     /// Keep one point per cube of edge length SIZE, in the input's units: the point nearest to the mean of its cube
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
@@ -53,7 +53,7 @@ pub(crate) struct ThinningArgs {
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,
     /// Seed of noise and samples; the same seed gives the same points
-    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, allow_negative_numbers = true)]
     pub(crate) seed: u64,
 }
 

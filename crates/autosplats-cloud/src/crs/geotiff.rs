@@ -11,6 +11,8 @@ const PROJECTED: u16 = 3072;
 const PROJECTED_CITATION: u16 = 3073;
 const LINEAR_UNIT: u16 = 3076;
 const LINEAR_UNIT_SIZE: u16 = 3077;
+/// Keys of heights: system, citation, datum, unit.
+const VERTICAL: u16 = 4096;
 const VERTICAL_UNIT: u16 = 4099;
 
 /// Tag numbers of floating-point values and of texts.
@@ -80,7 +82,7 @@ impl GeoKeys {
         } else {
             [PROJECTED_CITATION, CITATION, GEOGRAPHIC_CITATION]
         };
-        let vertical = code(VERTICAL_UNIT).and_then(Unit::of_epsg);
+        let vertical = code(VERTICAL_UNIT).and_then(Unit::of_epsg).or_else(|| code(VERTICAL).and_then(unit_of_heights));
         let crs = Crs {
             name: names.into_iter().find_map(|key| self.text(key)),
             epsg: if geographic { code(GEOGRAPHIC) } else { projected },
@@ -90,6 +92,18 @@ impl GeoKeys {
             geotiff: Some(self.clone()),
         };
         CrsDefinition { crs, geocentric: model == Some(3), heights: vertical }
+    }
+
+    /// The keys without those of heights.
+    pub(super) fn without_heights(mut self) -> Self {
+        let mut keys: Vec<[u16; 4]> = self.keys().collect();
+        keys.retain(|[id, ..]| !(VERTICAL..=VERTICAL_UNIT).contains(id));
+        if let Some(count) = self.directory.get_mut(3) {
+            *count = keys.len() as u16;
+            self.directory.truncate(4);
+            self.directory.extend(keys.as_flattened());
+        }
+        self
     }
 
     /// Keys that state what is known of a coordinate system.
@@ -122,6 +136,19 @@ fn unit_of_utm(epsg: u32) -> Option<Unit> {
     utm.then_some(Unit::Metre)
 }
 
+/// Unit of the EPSG vertical systems in feet, and of the usual ones in metres.
+fn unit_of_heights(epsg: u32) -> Option<Unit> {
+    match epsg {
+        // NAVD88, NGVD29 and their depths.
+        6360 | 5702 | 6358 | 6359 => Some(Unit::UsSurveyFoot),
+        // NAVD88, mean sea level, Cayman islands.
+        8228 | 8050 | 8052 | 6130..=6132 => Some(Unit::Foot),
+        // NAVD88, NGVD29, CGVD28 and 2013, EGM84, 96 and 2008, Newlyn, NAP, AHD.
+        5703 | 7968 | 5713 | 6647 | 5798 | 5773 | 3855 | 5701 | 5709 | 5711 => Some(Unit::Metre),
+        _ => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -144,6 +171,29 @@ mod tests {
             let back = keys.read();
             assert_eq!(back.crs, Crs { geotiff: Some(keys), ..crs }, "what was known comes back");
         }
+    }
+
+    #[test]
+    fn heights_are_known_by_unit_or_system_and_can_be_taken_away() {
+        let keys = |vertical: &[[u16; 4]]| {
+            let keys = [&[[1, 1, 0, 1 + vertical.len() as u16], [PROJECTED, 0, 1, 26917]], vertical].concat();
+            GeoKeys { directory: keys.into_flattened(), ..GeoKeys::default() }
+        };
+        let (unit, system) = ([VERTICAL_UNIT, 0, 1, 9003], [VERTICAL, 0, 1, 8228]);
+        for (vertical, heights) in [
+            (&[unit][..], Some(Unit::UsSurveyFoot)),
+            (&[system], Some(Unit::Foot)),
+            (&[system, unit], Some(Unit::UsSurveyFoot)),
+            (&[[VERTICAL, 0, 1, 5703]], Some(Unit::Metre)),
+            (&[[VERTICAL, 0, 1, 5103]], None),
+        ] {
+            let keys = keys(vertical);
+            assert_eq!(keys.read().heights, heights, "{vertical:?}");
+            let without = keys.without_heights();
+            assert_eq!((without.read().heights, without.directory[3]), (None, 1), "{vertical:?}");
+            assert_eq!(without.read().crs.epsg, Some(26917), "{vertical:?}: the rest stays");
+        }
+        assert_eq!(GeoKeys::default().without_heights(), GeoKeys::default(), "no keys");
     }
 
     #[test]

@@ -23,9 +23,18 @@ impl CrsDefinition {
     }
 }
 
+/// Keywords of vertical systems; ESRI's is `VERTCS`.
+const VERTICAL: &[&str] = &["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
+/// Keywords of systems that join a horizontal and a vertical one.
+const COMPOUND: &[&str] = &["COMPD_CS", "COMPOUNDCRS"];
+/// Keywords around a system that do not belong to its description.
+const AROUND: &[&str] = &["BOUNDCRS", "SOURCECRS", "COORDINATEOPERATION"];
+
 /// A keyword with its values.
 struct Node<'a> {
     keyword: String,
+    /// The text from the keyword on; once the node is complete, to its last bracket.
+    text: &'a str,
     values: Vec<Value<'a>>,
 }
 
@@ -78,6 +87,11 @@ impl Node<'_> {
         if (factor / degree - 1.0).abs() < 1e-6 { Some(Unit::Degree) } else { Unit::of_metres(factor) }
     }
 
+    /// Whether the third axis of a system is that of heights.
+    fn has_heights(&self) -> bool {
+        self.children().filter(|child| child.is(&["AXIS"])).count() > 2
+    }
+
     /// The unit of axis `index`: its own, or that of the system.
     fn axis_unit(&self, index: usize) -> Option<Unit> {
         let own = self.children().filter(|child| child.is(&["AXIS"])).nth(index).and_then(Node::unit);
@@ -93,9 +107,13 @@ fn read(text: &str) -> CrsDefinition {
     if text.is_empty() {
         found.crs.wkt = None;
     } else if text.len() <= MAX_LEN
-        && let Some(root) = parse(text)
+        && let Some((root, rest)) = parse(text)
     {
         system(&root, &mut found);
+        // ESRI writes a vertical system behind the horizontal one.
+        if let Some((vertical, _)) = parse(rest).filter(|(node, _)| node.is(VERTICAL)) {
+            system(&vertical, &mut found);
+        }
     }
     let CrsDefinition { crs, geocentric, heights } = &mut found;
     *heights = if *geocentric { crs.unit } else { crs.vertical_unit };
@@ -108,18 +126,18 @@ fn read(text: &str) -> CrsDefinition {
 /// Stores name, code and units of a system. Parts of a compound system add only what is still unknown.
 fn system(node: &Node<'_>, found: &mut CrsDefinition) {
     let crs = &mut found.crs;
-    if node.is(&["BOUNDCRS", "SOURCECRS", "COORDINATEOPERATION"]) {
+    if node.is(AROUND) {
         node.children().take(1).for_each(|child| system(child, found));
         return;
     }
-    let vertical = node.is(&["VERT_CS", "VERTCRS", "VERTICALCRS"]);
+    let vertical = node.is(VERTICAL);
     if !vertical {
         crs.name = crs.name.take().or_else(|| node.name());
         crs.epsg = crs.epsg.or_else(|| node.epsg());
     }
     if vertical {
         crs.vertical_unit = node.axis_unit(0);
-    } else if node.is(&["COMPD_CS", "COMPOUNDCRS"]) {
+    } else if node.is(COMPOUND) {
         node.children().for_each(|child| system(child, found));
     } else if node.is(&["GEOCCS"]) || is_cartesian_3d(node) {
         found.geocentric = true;
@@ -127,10 +145,23 @@ fn system(node: &Node<'_>, found: &mut CrsDefinition) {
     } else if !node.is(&["AUTHORITY", "ID"]) && crs.unit.is_none() {
         crs.unit = node.axis_unit(0);
         // The third axis of a three-dimensional system.
-        if node.children().filter(|child| child.is(&["AXIS"])).count() > 2 {
+        if node.has_heights() {
             crs.vertical_unit = node.axis_unit(2).filter(|unit| *unit != Unit::Degree);
         }
     }
+}
+
+/// The part of the text that describes x and y; `None` if no part does so without heights.
+pub(super) fn horizontal(text: &str) -> Option<&str> {
+    let (mut node, _) = parse(text)?;
+    while node.is(AROUND) || node.is(COMPOUND) {
+        let children = node.values.into_iter().filter_map(|value| match value {
+            Value::Node(child) => Some(child),
+            Value::Text(_) => None,
+        });
+        node = children.into_iter().find(|child| !child.is(VERTICAL))?;
+    }
+    (!node.has_heights()).then_some(node.text)
 }
 
 /// Whether a geodetic system of version 2 is geocentric.
@@ -140,8 +171,8 @@ fn is_cartesian_3d(node: &Node<'_>) -> bool {
     geodetic && node.child(&["CS"]).is_some_and(cartesian)
 }
 
-/// The tree at the start of the text. Text after the tree is ignored; brackets missing at the end are added.
-fn parse(text: &str) -> Option<Node<'_>> {
+/// The tree at the start of the text, and the text after it. Brackets missing at the end are added.
+fn parse(text: &str) -> Option<(Node<'_>, &str)> {
     let mut open: Vec<Node<'_>> = Vec::new();
     let mut rest = text;
     loop {
@@ -153,10 +184,11 @@ fn parse(text: &str) -> Option<Node<'_>> {
             rest = rest.get(end + 1..).unwrap_or_default();
         } else if first == ']' || first == ')' {
             rest = &rest[1..];
-            let done = open.pop()?;
+            let mut done = open.pop()?;
+            done.text = &done.text[..done.text.len() - rest.len()];
             match open.last_mut() {
                 Some(parent) => parent.values.push(Value::Node(done)),
-                None => return Some(done),
+                None => return Some((done, rest)),
             }
         } else {
             let end = rest.find(['[', '(', ']', ')', ',', '"']).unwrap_or(rest.len());
@@ -165,7 +197,7 @@ fn parse(text: &str) -> Option<Node<'_>> {
                 if word.is_empty() || open.len() == MAX_DEPTH {
                     return None;
                 }
-                open.push(Node { keyword: word.to_ascii_uppercase(), values: Vec::new() });
+                open.push(Node { keyword: word.to_ascii_uppercase(), text: rest, values: Vec::new() });
                 rest = &rest[end + 1..];
             } else {
                 open.last_mut()?.values.push(Value::Text(word));
@@ -177,7 +209,7 @@ fn parse(text: &str) -> Option<Node<'_>> {
         let done = open.pop()?;
         open.last_mut()?.values.push(Value::Node(done));
     }
-    open.pop()
+    open.pop().map(|root| (root, ""))
 }
 
 #[cfg(test)]
@@ -213,6 +245,27 @@ mod tests {
         assert_eq!(facts(three), (name("WGS 84 3D"), Some(4979), Some(Unit::Degree), Some(Unit::Metre)), "three axes");
         let bound = format!("BOUNDCRS[SOURCECRS[{FEET}],TARGETCRS[{degrees}]]");
         assert_eq!(facts(&bound), facts(FEET), "bound to another");
+    }
+
+    #[test]
+    fn heights_can_be_taken_away() {
+        let heights = r#"VERT_CS["NAVD88 (ftUS)",VERT_DATUM["v",2005],UNIT["US survey foot",0.3048006096012192]]"#;
+        let plane = r#"PROJCS["plane",GEOGCS["g"],UNIT["metre",1],AUTHORITY["EPSG","26917"]]"#;
+        let both = format!(r#" COMPD_CS["both", {plane}, {heights}, AUTHORITY["EPSG","9999"]]"#);
+        let esri = format!("{plane},{}", heights.replace("VERT_CS", "VERTCS"));
+        let bound = format!("BOUNDCRS[SOURCECRS[{both}],TARGETCRS[{plane}]]");
+        for text in [&both, &esri, &bound] {
+            let crs = Crs::from_wkt(text);
+            assert_eq!((crs.unit, crs.vertical_unit), (Some(Unit::Metre), Some(Unit::UsSurveyFoot)), "{text}");
+            let flat = crs.horizontal();
+            assert_eq!((flat.wkt.as_deref(), flat.epsg), (Some(plane), Some(26917)), "{text}");
+            assert_eq!((flat.name.as_deref(), flat.vertical_unit), (Some("plane"), None), "{text}");
+            assert_eq!(flat.clone().horizontal(), flat, "{text}: once");
+        }
+        let three = r#"GEOGCRS["3D",CS[ellipsoidal,3],AXIS["lat",north],AXIS["lon",east],
+            AXIS["h",up,LENGTHUNIT["foot",0.3048]],ANGLEUNIT["degree",0.0174532925199433],ID["EPSG",4979]]"#;
+        let flat = Crs::from_wkt(three).horizontal();
+        assert_eq!(flat, Crs { unit: Some(Unit::Degree), ..Crs::default() }, "three axes are one system");
     }
 
     #[test]

@@ -2,15 +2,16 @@
 
 use std::{ops::Range, path::Path};
 
-use autosplats_cloud::{Error, FieldValues, PointCloud, residual, storage_origin};
+use autosplats_cloud::{Crs, Error, FieldValues, PointCloud, Unit, degree_origin, residual, storage_origin};
 use glam::DVec3;
 use rayon::prelude::*;
 
 pub use super::columns::{MAX_COLUMNS, numbered};
 use super::{
     Attribute, Job, ReadOptions,
-    columns::{AGAIN, field_name, find_color},
+    columns::{AGAIN, field_name, find_axes, find_color, is_longitude},
     text::is_packed_color,
+    units::{LOOKS_LIKE_DEGREES, look_like_degrees},
 };
 use crate::color_scale::ColorScale;
 
@@ -129,7 +130,7 @@ pub struct Table<'a> {
     pub count: usize,
     /// Whether the most significant byte of a number comes first.
     pub big_endian: bool,
-    /// The values of a point. `x`, `y` and `z` must be among them.
+    /// The values of a point. `x`, `y` and `z`, or other names of coordinates, must be among them.
     pub columns: Vec<Column>,
     /// Whether a column named `rgb` or `rgba` holds a colour packed into 32 bits.
     pub packed_rgb: bool,
@@ -143,23 +144,36 @@ impl Table<'_> {
     /// # Errors
     /// [`Error::Malformed`] if there are no coordinates, or if columns end beyond the memory; [`Error::OutOfMemory`].
     pub fn cloud(self, name: &Path, place: &str, options: &ReadOptions) -> Result<PointCloud, Error> {
-        self.into_cloud(&Job { path: name, progress: &(), bytes: &[], options, triangles: false }, place)
+        // Messages state their units elsewhere, and all frames of a stream must be in one.
+        self.made(&Job { path: name, progress: &(), bytes: &[], options, triangles: false }, place, false)
     }
 
     /// Makes the cloud. `place` is the place in errors about missing coordinates.
-    pub(super) fn into_cloud(mut self, job: &Job<'_>, place: &str) -> Result<PointCloud, Error> {
+    pub(super) fn into_cloud(self, job: &Job<'_>, place: &str) -> Result<PointCloud, Error> {
+        self.made(job, place, true)
+    }
+
+    /// Makes the cloud; `guess` tells whether coordinates without a unit may be taken for degrees by their shape.
+    fn made(mut self, job: &Job<'_>, place: &str, guess: bool) -> Result<PointCloud, Error> {
         if self.columns.len() > MAX_COLUMNS {
             return Err(job.malformed(place, format!("{} values a point; at most {MAX_COLUMNS}", self.columns.len())));
         }
-        let Some(xyz) = self.take(["x", "y", "z"]) else {
+        let names: Vec<String> = self.columns.iter().map(|column| column.name.clone()).collect();
+        let Some(axes) = find_axes(&names) else {
             return Err(job.malformed(place, "there are no x, y and z among the values of a point"));
         };
         self.check_size(job, place)?;
+        let xyz = self.take(axes);
+        let world = |i| DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, i)));
+        let fine = xyz[..2].iter().all(|column| column.scalar == Scalar::F64);
+        let guessed = guess && fine && job.options.columns.is_none() && look_like_degrees(self.count, world);
+        let degrees = guessed || is_longitude(&names[axes[0]]);
+        let origin = if degrees { degree_origin(self.count, world) } else { storage_origin(self.count, world) };
         let exact = if job.options.exact { 12 } else { 0 };
         let fields: usize = self.columns.iter().map(|column| column.scalar.size()).sum();
         job.check_memory(self.count, 12 + exact + fields)?;
         let names: Vec<String> = self.columns.iter().map(|column| column.name.clone()).collect();
-        let colors = find_color(&names).and_then(|three| self.take(three.map(|index| &*names[index])));
+        let colors = find_color(&names).map(|three| self.take(three));
         let is_packed = |column: &Column| self.packed_rgb && is_packed_color(&column.name, column.scalar);
         let packed = self.columns.iter().position(is_packed).map(|index| self.columns.remove(index));
         let splats = match (&colors, &packed) {
@@ -173,8 +187,13 @@ impl Table<'_> {
             start: self.done + (1.0 - self.done) * step as f32 / steps as f32,
             len: (1.0 - self.done) / steps as f32,
         };
-        let (origin, positions) = self.positions(job, &xyz, part(0))?;
-        let mut cloud = PointCloud::new(origin, positions);
+        let mut cloud = PointCloud::new(origin, self.positions(job, &xyz, origin, part(0))?);
+        if degrees {
+            cloud = cloud.with_crs(Crs { unit: Some(Unit::Degree), ..Crs::default() });
+        }
+        if guessed {
+            job.note(LOOKS_LIKE_DEGREES);
+        }
         if let Some(residuals) = self.residuals(job, &xyz, &cloud)? {
             cloud = cloud.with_residuals(residuals)?;
         }
@@ -254,16 +273,15 @@ impl Table<'_> {
         Some([find(names[0])?, find(names[1])?, find(names[2])?])
     }
 
-    /// Removes and returns the columns of three names, if all are there.
-    fn take(&mut self, names: [&str; 3]) -> Option<[Column; 3]> {
-        let indices = self.find(names)?;
+    /// Removes and returns three columns.
+    fn take(&mut self, indices: [usize; 3]) -> [Column; 3] {
         let taken = indices.map(|index| self.columns[index].clone());
         let mut index = 0;
         self.columns.retain(|_| {
             index += 1;
             !indices.contains(&(index - 1))
         });
-        Some(taken)
+        taken
     }
 
     /// Checks that every value lies within the bytes. Readers check first, with better messages.
@@ -302,18 +320,17 @@ impl Table<'_> {
         &self,
         job: &Job<'_>,
         xyz: &[Column; 3],
+        origin: DVec3,
         part: ProgressRange,
-    ) -> Result<(DVec3, Vec<[f32; 3]>), Error> {
+    ) -> Result<Vec<[f32; 3]>, Error> {
         let world = |i| DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, i)));
-        let origin = storage_origin(self.count, world);
-
         let [x, y, z] = xyz;
         let floats = xyz.iter().all(|column| column.scalar == Scalar::F32 && column.stride == x.stride);
         // All three lie within one record, not each in a run of its own.
         let first = x.offset.min(y.offset).min(z.offset);
         let together = x.offset.max(y.offset).max(z.offset) - first + 4 <= x.stride;
         let adjacent = y.offset == x.offset + 4 && z.offset == x.offset + 8;
-        let positions = if origin == DVec3::ZERO && floats && together && adjacent && !self.big_endian {
+        if origin == DVec3::ZERO && floats && together && adjacent && !self.big_endian {
             // The common case, and the fast one: twelve adjacent bytes, copied unchanged.
             self.collect("positions", x, job, part, |record| {
                 let mut raw = [0; 12];
@@ -331,8 +348,7 @@ impl Table<'_> {
             collect("positions", self.count, job, part, |i| xyz.map(|column| self.value::<f32>(column, i)))
         } else {
             collect("positions", self.count, job, part, |i| (world(i) - origin).as_vec3().to_array())
-        };
-        Ok((origin, positions?))
+        }
     }
 
     /// Like [`collect`], from the records that start at the values of `column`. The last record may end after its

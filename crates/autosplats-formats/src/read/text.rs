@@ -3,11 +3,14 @@
 //! The text is cut into pieces at line ends, and the pieces are parsed in parallel. Each row becomes one record of
 //! little-endian numbers for a [`Table`](super::table::Table).
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use autosplats_cloud::{Error, excerpt};
 use rayon::prelude::*;
 
 use super::{
     Job,
+    columns::{is_latitude, is_longitude},
     table::{CHUNK, ProgressRange, Scalar, reserve},
 };
 
@@ -19,7 +22,7 @@ pub(super) const TEXT: &str = "text";
 
 /// Whether a value is a coordinate, which keeps all its digits.
 pub(super) fn is_coordinate(name: &str) -> bool {
-    ["x", "y", "z"].contains(&&*name.to_ascii_lowercase())
+    ["x", "y", "z"].contains(&&*name.to_ascii_lowercase()) || is_longitude(name) || is_latitude(name)
 }
 
 /// What to do with the next value of a row.
@@ -67,6 +70,24 @@ pub(super) struct Rows<'a> {
     pub(super) may_be_cut: bool,
 }
 
+/// Rows that end early: after how many values, the byte that fills the rest of their records, and how many there are.
+pub(super) struct Short {
+    values: usize,
+    fill: u8,
+    rows: AtomicUsize,
+}
+
+impl Short {
+    pub(super) fn new(values: usize, fill: u8) -> Self {
+        Self { values, fill, rows: AtomicUsize::new(0) }
+    }
+
+    /// Number of such rows so far.
+    pub(super) fn rows(&self) -> usize {
+        self.rows.load(Ordering::Relaxed)
+    }
+}
+
 /// Result of parsing one piece of text.
 struct Piece {
     records: Vec<u8>,
@@ -80,6 +101,17 @@ impl Rows<'_> {
         self.parse_and_show(job, start, part, |_, _| Ok(()))
     }
 
+    /// Like [`parse`](Self::parse), of rows of which some end early.
+    pub(super) fn parse_with_short(
+        &self,
+        job: &Job<'_>,
+        start: usize,
+        part: ProgressRange,
+        short: &Short,
+    ) -> Result<(Vec<u8>, usize), Error> {
+        self.parse_all(job, start, part, Some(short), |_, _| Ok(()))
+    }
+
     /// Like [`parse`](Self::parse), and passes the records and their number to `show`, about a million at a time,
     /// before the next ones are parsed.
     pub(super) fn parse_and_show(
@@ -87,6 +119,17 @@ impl Rows<'_> {
         job: &Job<'_>,
         start: usize,
         part: ProgressRange,
+        show: impl Fn(&[u8], usize) -> Result<(), Error>,
+    ) -> Result<(Vec<u8>, usize), Error> {
+        self.parse_all(job, start, part, None, show)
+    }
+
+    fn parse_all(
+        &self,
+        job: &Job<'_>,
+        start: usize,
+        part: ProgressRange,
+        short: Option<&Short>,
         show: impl Fn(&[u8], usize) -> Result<(), Error>,
     ) -> Result<(Vec<u8>, usize), Error> {
         let len = self.record_len();
@@ -104,7 +147,7 @@ impl Rows<'_> {
                 cuts.push(at);
             }
             let pieces: Vec<Piece> =
-                cuts.par_windows(2).map(|cut| self.parse_piece(&text[cut[0]..cut[1]], cut[0])).collect();
+                cuts.par_windows(2).map(|cut| self.parse_piece(&text[cut[0]..cut[1]], cut[0], short)).collect();
             for piece in pieces {
                 let take = piece.rows.min(wanted - rows);
                 let bytes = take * len;
@@ -152,15 +195,15 @@ impl Rows<'_> {
         self.tokens.iter().map(|token| token.size()).sum()
     }
 
-    fn parse_piece(&self, text: &[u8], start: usize) -> Piece {
+    fn parse_piece(&self, text: &[u8], start: usize, short: Option<&Short>) -> Piece {
         let mut piece = Piece { records: Vec::new(), rows: 0, error: None };
         let mut at = 0;
         while at < text.len() {
             let end = line_end(text, at);
-            let line = text[at..end].trim_ascii();
+            let line = trim(&text[at..end]);
             if !is_blank(line) {
                 let len = piece.records.len();
-                if let Err(what) = self.parse_row(line, &mut piece.records) {
+                if let Err(what) = self.parse_row(line, short, &mut piece.records) {
                     piece.records.truncate(len);
                     piece.error = Some((start + at, what));
                     break;
@@ -172,12 +215,23 @@ impl Rows<'_> {
         piece
     }
 
-    fn parse_row(&self, line: &[u8], record: &mut Vec<u8>) -> Result<(), String> {
+    fn parse_row(&self, line: &[u8], short: Option<&Short>, record: &mut Vec<u8>) -> Result<(), String> {
         let mut values = values(line);
         for (index, token) in self.tokens.iter().enumerate() {
-            let value = values.next().ok_or_else(|| {
-                format!("{index} values where a point has {}; complete or remove the line", self.tokens.len())
-            })?;
+            let Some(value) = values.next() else {
+                let rest = self.tokens[index..].iter().map(|token| token.size()).sum::<usize>();
+                return match short.filter(|short| short.values == index) {
+                    Some(short) => {
+                        record.resize(record.len() + rest, short.fill);
+                        short.rows.fetch_add(1, Ordering::Relaxed);
+                        Ok(())
+                    }
+                    None => Err(format!(
+                        "{index} values where a point has {}; complete or remove the line",
+                        self.tokens.len()
+                    )),
+                };
+            };
             match token {
                 Token::Skip => {}
                 Token::SkipList => {
@@ -253,6 +307,17 @@ pub(super) fn values(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// Whether a value is a colour packed into 32 bits.
 pub(super) fn is_packed_color(name: &str, scalar: Scalar) -> bool {
     scalar.size() == 4 && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase())
+}
+
+/// A line without the blanks around it, and without a byte order mark.
+pub(super) fn trim(line: &[u8]) -> &[u8] {
+    without_mark(line.trim_ascii()).trim_ascii_start()
+}
+
+/// A line without the byte order mark that the parts of joined files begin with.
+#[inline]
+pub(super) fn without_mark(line: &[u8]) -> &[u8] {
+    line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line)
 }
 
 /// Whether a trimmed line is empty or a comment.

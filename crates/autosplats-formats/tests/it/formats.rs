@@ -424,10 +424,10 @@ fn errors_name_place_and_remedy() {
     check("a.pcd", b"1 2 three\n", &["line 1", ".xyz"]);
     check("a.xyz", b"1 2\n3 4\n", &["line 1", "x, y and z"]);
     check("a.xyz", b"1 2 3\n4 5 6 7\n", &["line 2", "'7'"]);
-    check("a.xyz", b"words\nand more words\n", &["line 2", "'and'"]);
+    check("a.xyz", b"words\nand more words\n", &["line 1", "'words'", "no points"]);
     check("a.csv", b"1,5;2.5;3,5\n", &["decimal commas", "points"]);
     check("a.pts", b"5\n1 2 3\n", &["1 of 5 points"]);
-    check("a.txt", &[0xff, 0xfe, b'1', 0], &["byte 3", "UTF-8"]);
+    check("a.txt", &[b'1', 0, b' ', 0], &["byte 1", "UTF-8"]);
     check("a.laz", b"nothing", &["byte 0", "LASF"]);
     let las = las_bytes((1, 2), 0, false, 100);
     check("a.las", &las[..las.len() - 1999], &["first of 100 points", "copy"]);

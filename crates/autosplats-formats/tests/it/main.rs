@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
+mod choosing;
 mod color_scales;
 mod common;
+mod depth_images;
 mod e57;
+mod field_text;
 mod formats;
 mod gltf;
 mod hostile;

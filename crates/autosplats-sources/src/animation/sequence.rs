@@ -6,7 +6,7 @@ use std::{
 };
 
 use autosplats_cloud::{Contents, Error, PointCloud, Progress};
-use autosplats_formats::{ReadOptions, describe, read_mesh, read_with};
+use autosplats_formats::{Description, ReadOptions, describe, read_mesh, read_with};
 use autosplats_scenes::Surface;
 use rayon::prelude::*;
 
@@ -14,6 +14,7 @@ use super::frames::Frames;
 use crate::{
     Timeline,
     listing::{candidates, is_named_as_cloud},
+    source::or_empty,
 };
 
 /// Files, one per frame.
@@ -32,7 +33,8 @@ impl Sequence {
         let files = clouds(name, found, options)?;
         if files.len() < all {
             let (left_out, frames) = (all - files.len(), files.len());
-            let what = format!("left out {left_out} of {all} files, which are not clouds or have no number");
+            let why = "which are not clouds, are depth images beside clouds, or have no number";
+            let what = format!("left out {left_out} of {all} files, {why}");
             progress.note(&format!("{what}; {frames} are the frames"));
         }
         let timeline = Timeline::even(files.len(), fps)?;
@@ -52,7 +54,8 @@ impl Frames for Sequence {
     }
 
     fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
-        Ok(vec![Arc::new(read_with(&self.files[frame], &self.options, progress)?)])
+        let cloud = or_empty(read_with(&self.files[frame], &self.options, progress))?;
+        Ok(vec![Arc::new(cloud)])
     }
 
     fn surface(&self, frame: usize, progress: &dyn Progress) -> Result<Surface, Error> {
@@ -91,9 +94,13 @@ fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<
     let looked =
         files.into_par_iter().filter(|file| is_named_as_cloud(file)).map(|file| (describe(&file, options), file));
     let looked: Vec<_> = looked.collect();
+    // Pictures beside clouds often have a layer of depths.
+    let is_image = |described: &Description| described.format.starts_with("depth image");
+    let has_clouds = looked.iter().any(|(described, _)| described.as_ref().is_ok_and(|found| !is_image(found)));
     let (mut kept, mut sound, mut reason) = (Vec::new(), false, None);
     for (described, file) in looked {
         match described {
+            Ok(found) if has_clouds && is_image(&found) => continue,
             Ok(_) => sound = true,
             Err(Error::UnknownFormat { .. } | Error::Unsupported { .. }) => continue,
             Err(error) => reason = reason.or(Some(error)),

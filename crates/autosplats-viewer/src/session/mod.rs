@@ -26,7 +26,7 @@ pub(crate) use self::document::{
 pub(crate) use self::editing::CachedCounts;
 pub(crate) use self::glance::{FirstLook, SharedViewFrame, ViewFrame};
 pub(crate) use self::kept::StoredInput;
-pub(crate) use self::loading::{JobId, JobNews, Loader, Watch};
+pub(crate) use self::loading::{JobId, JobNews, Loader, Watch, read_options};
 pub(crate) use self::measure::Ruler;
 pub(crate) use self::opening::{Arrival, JobTarget};
 pub(crate) use self::playing::{Clock, Playing, Reel, SPEEDS, WaitingInput};

@@ -73,7 +73,7 @@ impl State {
     /// # Errors
     /// A message with the file's name and what is wrong.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let text = autosplats::cloud::read_text(path).map_err(|error| format!("{}: {error}", path.display()))?;
         // Only an object is accepted: an empty list would deserialize as a session of defaults.
         let state = serde_json::from_str::<serde_json::Map<_, _>>(&text)
             .and_then(|fields| serde_json::from_value::<Self>(fields.into()))
@@ -149,6 +149,7 @@ pub(crate) fn folder(path: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use autosplats::Background;
     use autosplats::cloud::glam::{DMat4, DQuat, DVec3};
     use autosplats_formats::ReadOptions;
 
@@ -224,6 +225,7 @@ mod tests {
             "{\"inputs\": 3}",
             "{\"unknown\": 1}",
             "{\"look\": {\"settings\": {\"reconstruction\": {\"k\": 0}}}}",
+            "{\"look\": {\"settings\": {\"shading\": {\"background\": \"whit\"}}}}",
             "{\"inputs\": [{\"source\": \"a\", \"options\": {\"colums\": []}}]}",
             "{\"inputs\": [{\"source\": \"a\", \"play\": {\"topic\": []}}]}",
             "{\"inputs\": [{\"source\": \"a\", \"play\": {\"decay\": -2}}]}",
@@ -236,5 +238,21 @@ mod tests {
             assert!(error.contains("state.json"), "names the file: {error}");
         }
         assert!(State::read(&folder.path().join("none.json")).is_err(), "no file");
+    }
+
+    #[test]
+    fn backgrounds_may_be_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("state.json");
+        let background = |text: &str| {
+            let text = format!("{{\"look\": {{\"settings\": {{\"shading\": {{\"background\": {text}}}}}}}}}");
+            std::fs::write(&path, text).expect("written");
+            State::read(&path).expect("a state").look.settings.shading.background
+        };
+        assert_eq!(background("\"white\""), Background::Color([255; 3]), "as the command line names it");
+        assert_eq!(background("{\"gradient\": [[1, 2, 3], [4, 5, 6]]}"), Background::Gradient([1, 2, 3], [4, 5, 6]));
+        for kept in [Background::Transparent, Background::Color([7; 3]), Background::Gradient([1; 3], [2; 3])] {
+            assert_eq!(background(&serde_json::to_string(&kept).expect("JSON")), kept, "as it is written");
+        }
     }
 }

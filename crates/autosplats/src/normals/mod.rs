@@ -172,10 +172,10 @@ pub fn estimate_normals(
 /// where [`Normals`] are NaN. Any k is allowed.
 ///
 /// # Errors
-/// [`Error::TooManyPoints`].
-pub(crate) fn exact_k_radii(cloud: &PointCloud, k: u32) -> Result<Vec<f32>, Error> {
+/// [`Error::TooManyPoints`], and [`Error::Cancelled`] if `progress` says so.
+pub(crate) fn exact_k_radii(cloud: &PointCloud, k: u32, progress: &dyn Progress) -> Result<Vec<f32>, Error> {
     let finite = finite_points(cloud).len() as u32;
-    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, &())?;
+    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, progress)?;
     let of_density = 0.5 * (k.min(finite.saturating_sub(1)).max(1) as f32).sqrt();
     Ok(radius.into_iter().map(|radius| radius * of_density).collect())
 }

@@ -203,7 +203,10 @@ impl CpuFrame<'_> {
 
     fn fill_cells(&mut self) {
         let CpuRenderer { projector, adapter, depth_noise, .. } = &mut *self.renderer;
-        depth_noise.get_or_insert_with(|| DepthNoise::new(self.cloud));
+        if depth_noise.is_none() {
+            let found = DepthNoise::new(self.cloud, self.cancel);
+            *depth_noise = (!self.cancel.is_given_up()).then_some(found);
+        }
         adapter.begin(projector.screen(), &self.view, self.rules.project.k, self.cancel);
     }
 
@@ -240,13 +243,13 @@ impl CpuFrame<'_> {
     fn orient(&mut self, round: Round) {
         let CpuRenderer { projector, sensors, surfels, .. } = &mut *self.renderer;
         let sensors = sensors.get_or_insert_with(|| Sensors::new(self.cloud));
-        sensors.orient(&mut surfels[first(projector.screen(), round)..], &self.view);
+        sensors.orient(&mut surfels[first(projector.screen(), round)..], &self.view, self.cancel);
     }
 
     fn average(&mut self, round: Round) {
         let CpuRenderer { projector, over_time, splatter, surfels, .. } = &mut *self.renderer;
         let screen = projector.screen();
-        over_time.smooth(&mut surfels[first(screen, round)..], screen, splatter.last(), &self.view);
+        over_time.smooth(&mut surfels[first(screen, round)..], screen, splatter.last(), &self.view, self.cancel);
     }
 
     fn draw(&mut self, round: Round) {
@@ -271,7 +274,7 @@ impl CpuFrame<'_> {
     fn keep(&mut self) {
         let CpuRenderer { projector, over_time, surfels, .. } = &mut *self.renderer;
         if self.rules.averaged.is_some() {
-            over_time.keep(surfels, projector.screen(), &self.view);
+            over_time.keep(surfels, projector.screen(), &self.view, self.cancel);
         }
     }
 
@@ -300,9 +303,11 @@ impl CpuFrame<'_> {
         let values = layers.scalar_about;
         let scene = Scene { view: &self.picture, up: upward.of(cloud), origin: cloud.origin(), exposure, values };
         let mut following = self.rules.averaged.map(|_| last_picture.following(self.picture));
-        let mut average = following.as_mut().map(|following| |image: &mut Image| following.average(layers, image));
+        let cancel = self.cancel;
+        let mut average =
+            following.as_mut().map(|following| |image: &mut Image| following.average(layers, image, cancel));
         let average = average.as_mut().map(|average| average as &mut dyn FnMut(&mut Image));
-        self.value_range = shade(layers, &scene, shading, *all_layers, average, image, self.cancel);
+        self.value_range = shade(layers, &scene, shading, *all_layers, average, image, cancel);
     }
 
     /// Makes the frame the last one.

@@ -19,6 +19,7 @@ use crate::Error;
 use crate::adapt::DepthNoise;
 use crate::adapt::gpu::DepthNoiseBuffer;
 use crate::camera::{Camera, PlacedView, View};
+use crate::cancel::NEVER;
 use crate::fit::Surfel;
 use crate::fit::orient::Sensors;
 use crate::fit::orient::gpu::{sensor_buffer, write_sensors};
@@ -148,7 +149,7 @@ impl GpuRenderer {
             self.cloud.resize(&self.gpu, cloud.len())?;
             self.uploader.positions(&self.gpu, cloud, &self.cloud, &|done| report(part * done))?;
             self.upload_sensors(&Sensors::new(cloud))?;
-            if self.depth_noise.write(&self.gpu, &DepthNoise::new(cloud))? {
+            if self.depth_noise.write(&self.gpu, &DepthNoise::new(cloud, &NEVER))? {
                 self.prepared = None;
             }
             self.resident.points = points;

@@ -1,5 +1,7 @@
 //! Settings of shading.
 
+use super::Background;
+
 /// How splats become an image.
 ///
 /// # Examples
@@ -155,18 +157,6 @@ pub enum ColorMap {
     Gray,
     /// Pale grey over orange to dark red: the high end is a warning. The usual one for radii.
     Reds,
-}
-
-/// What to show where no surface is. Colours are sRGB, 8 bits a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Background {
-    /// One colour.
-    Color([u8; 3]),
-    /// From the first colour at the top to the second at the bottom.
-    Gradient([u8; 3], [u8; 3]),
-    /// Nothing: alpha is 0.
-    Transparent,
 }
 
 impl Default for Shading {

@@ -1,13 +1,15 @@
 //! Coordinate system of a LAS file.
 
-use autosplats_cloud::{Crs, CrsDefinition, GeoKeys, Unit};
-use glam::DVec3;
+use autosplats_cloud::{Crs, CrsDefinition, GeoKeys, Unit, looks_like_degrees};
 
-use super::{header::Header, records::Records};
+use super::{super::units::LOOKS_LIKE_DEGREES, header::Header, records::Records};
 use crate::las;
 
 /// Coarsest scale of coordinates that may be degrees: 1e-5 degrees are about a metre.
-const FINEST_DEGREE: f64 = 1e-5;
+const COARSEST_DEGREE: f64 = 1e-5;
+
+/// How much higher than wide a box in degrees looks, with a scale as fine as degrees need: a relief of a thousandth.
+const DEGREES_RATIO: f64 = 100.0;
 
 /// The coordinate system, and notes about it.
 pub(super) struct CoordinateSystem {
@@ -54,22 +56,18 @@ pub(super) fn of(header: &Header, records: &Records<'_>) -> CoordinateSystem {
                 "the coordinate system is geocentric, but the points are {metres} from its origin, not 6400"
             ));
         }
-        if crs.unit.is_none() && crs.epsg.is_none() && looks_like_degrees(low, high, header.scale) {
+        if crs.unit.is_none()
+            && crs.epsg.is_none()
+            && finely_scaled(header)
+            && looks_like_degrees([low, high], DEGREES_RATIO)
+        {
             crs.unit = Some(Unit::Degree);
-            notes.push("no coordinate system; x and y look like degrees of longitude and latitude".into());
+            notes.push(LOOKS_LIKE_DEGREES.into());
         }
-    }
-    if crs.unit == Some(Unit::Degree) && crs.vertical_unit.is_none() {
-        crs.vertical_unit = Some(Unit::Metre);
     }
     CoordinateSystem { crs, notes }
 }
 
-/// Whether coordinates without a system look like longitude and latitude with heights in metres or feet. Such
-/// coordinates are on the globe, finely scaled, and in a box far higher than wide.
-fn looks_like_degrees(low: DVec3, high: DVec3, scale: DVec3) -> bool {
-    let size = high - low;
-    let on_globe = low.x >= -180.0 && high.x <= 180.0 && low.y >= -90.0 && high.y <= 90.0;
-    let edge = size.x.max(size.y);
-    on_globe && scale.abs().truncate().max_element() <= FINEST_DEGREE && edge > 0.0 && size.z > 100.0 * edge
+fn finely_scaled(header: &Header) -> bool {
+    header.scale.abs().truncate().max_element() <= COARSEST_DEGREE
 }

@@ -16,7 +16,7 @@ use crate::las;
 const COPC_INFO: usize = 160;
 
 pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
-    let header = Header::read(job)?;
+    let mut header = Header::read(job)?;
     let records = Records::read(job.bytes, &header);
     let (dimensions, mut notes) = dimensions(&header, &records);
     notes.extend(records.notes.iter().cloned());
@@ -43,13 +43,14 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     }
     attributes.extend(colors);
 
+    let points = points(job, &mut header, &records, &mut notes);
     let [low, high] = header.bounds;
-    let bounds =
-        (low.is_finite() && high.is_finite() && low.cmple(high).all() && header.points > 0).then_some([low, high]);
-    if header.points > 0 && header.sane_bounds().is_none() {
-        notes.push(format!("the bounds in the header, {low} to {high}, cannot be those of the points"));
+    let valid = low.is_finite() && high.is_finite() && low.cmple(high).all();
+    // A header without a number of points was never finished.
+    let bounds = (valid && header.stated > 0).then_some([low, high]);
+    if header.stated > 0 && header.sane_bounds().is_none() {
+        notes.push("the bounds in the header cannot be those of the points".into());
     }
-    notes.extend(missing(job, &header, &records));
 
     let mut details = details(&header, &records);
     if let Some(tree) = tree {
@@ -63,7 +64,7 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     };
     Ok(Description {
         format,
-        points: Some(header.points),
+        points,
         bounds,
         attributes,
         crs: meaning.crs,
@@ -74,16 +75,30 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     })
 }
 
-/// What is missing of the points that the header claims, as far as that shows without decoding.
-fn missing(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Option<String> {
-    if header.compressed {
-        return laz::Compressed::open(job, header, records).err().map(|error| match error {
-            Error::Malformed { place, what, .. } => format!("{place}: {what}"),
-            error => error.to_string(),
-        });
+/// The number of points, if it shows without decompressing; notes tell where the header states another.
+fn points(job: &Job<'_>, header: &mut Header, records: &Records<'_>, notes: &mut Vec<String>) -> Option<u64> {
+    if !header.compressed {
+        notes.extend(header.more_than_stated(header.held));
+        let held = ((job.bytes.len() - header.point_data) / header.record_len) as u64;
+        if held < header.points {
+            notes.push(format!("the file is cut off: it holds {held} of {} points", header.points));
+        }
+        return Some(header.points);
     }
-    let held = ((job.bytes.len() - header.point_data) / header.record_len) as u64;
-    (held < header.points).then(|| format!("the file is cut off: it holds {held} of {} points", header.points))
+    match laz::Compressed::open(job, header, records, false) {
+        Ok(Some(compressed)) => {
+            notes.extend(compressed.note);
+            notes.extend(header.more_than_stated(compressed.points));
+            header.points = header.points.max(compressed.points as u64);
+        }
+        Ok(None) => {}
+        Err(Error::Malformed { place, what, .. }) => {
+            notes.push(format!("{place}: {what}"));
+            return (header.stated > 0).then_some(header.stated);
+        }
+        Err(error) => notes.push(error.to_string()),
+    }
+    Some(header.points)
 }
 
 fn details(header: &Header, records: &Records<'_>) -> Vec<(String, String)> {

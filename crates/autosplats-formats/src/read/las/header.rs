@@ -22,11 +22,18 @@ pub(super) struct Header {
     pub(super) format: usize,
     pub(super) record_len: usize,
     pub(super) compressed: bool,
+    /// Number of points in the header.
+    pub(super) stated: u64,
+    /// Number of points: the stated one, or that of all whole records if zero is stated.
     pub(super) points: u64,
+    /// Number of whole records that there is room for, if they are not compressed.
+    pub(super) held: usize,
     pub(super) points_by_return: Vec<u64>,
     pub(super) point_data: usize,
     /// First byte after the header, where the variable length records begin, and their number.
     pub(super) records: (usize, u32),
+    /// First byte behind the points: of what the header places there, or the end of the file.
+    pub(super) end: usize,
     /// First byte and number of the extended records after the points.
     pub(super) extended: (u64, u32),
     pub(super) scale: DVec3,
@@ -71,6 +78,14 @@ impl Header {
         }
         let legacy = u64::from(raw.u32(107));
         let large = if long { raw.u64(247) } else { 0 };
+        let stated = if large == 0 { legacy } else { large };
+        let extended = if long { (raw.u64(235), raw.u32(243)) } else { (0, 0) };
+        let compressed = kind & 0xc0 != 0;
+        let waveforms = if bytes[24..26] >= [1, 3][..] && bytes.len() >= 235 { raw.u64(227) } else { 0 };
+        let behind = [waveforms, if extended.1 > 0 { extended.0 } else { 0 }].map(|at| usize::try_from(at).ok());
+        let behind = behind.into_iter().flatten().filter(|at| (point_data + 1..bytes.len()).contains(at)).min();
+        let end = behind.unwrap_or(bytes.len());
+        let held = (end - point_data) / record_len;
         let short_returns = || (0..5).map(|i| u64::from(raw.u32(111 + 4 * i))).collect();
         Ok(Self {
             version: (bytes[24], bytes[25]),
@@ -80,8 +95,10 @@ impl Header {
             created: (raw.u16(90), raw.u16(92)),
             format,
             record_len,
-            compressed: kind & 0xc0 != 0,
-            points: if large == 0 { legacy } else { large },
+            compressed,
+            stated,
+            held,
+            points: if stated == 0 && !compressed { held as u64 } else { stated },
             points_by_return: if large == 0 {
                 short_returns()
             } else {
@@ -89,7 +106,8 @@ impl Header {
             },
             point_data,
             records: (raw.u16(94).into(), raw.u32(100)),
-            extended: if long { (raw.u64(235), raw.u32(243)) } else { (0, 0) },
+            end,
+            extended,
             scale,
             offset,
             bounds: [raw.vector(187, 16), raw.vector(179, 16)],
@@ -110,6 +128,13 @@ impl Header {
         let reach = self.scale.abs() * 2_147_483_649.0;
         let inside = |point: DVec3| (point - self.offset).abs().cmple(reach).all();
         (low.cmple(high).all() && inside(low) && inside(high)).then_some(self.bounds)
+    }
+
+    /// Note on a number of points in the header that is less than `found`, the number of whole records.
+    pub(super) fn more_than_stated(&self, found: usize) -> Option<String> {
+        let stated = self.stated;
+        let what = if stated == 0 { "all are read" } else { "the others are left out" };
+        (found as u64 > stated).then(|| format!("the header states {stated} points, but {found} are there; {what}"))
     }
 
     /// Name and version of the format, without the encoding.

@@ -2,25 +2,29 @@
 //!
 //! # How it works
 //!
-//! Records are compressed in chunks, and a table at the end states the length of each chunk. Chunks are independent, so
-//! several are decompressed in parallel with the record decompressors of the `laz` crate. The crate's readers are not
-//! used: they allocate what the chunk table claims. Here every claim is first compared with the length of the file.
+//! Records are compressed in [`chunks`](super::chunks), which are independent. So several are decompressed in parallel
+//! with the record decompressors of the `laz` crate. The crate's readers are not used: they allocate what the chunk
+//! table claims. Here every claim is first compared with the length of the file.
 
-use std::{io::Cursor, ops::Range};
+use std::{
+    io::Cursor,
+    ops::Range,
+    sync::atomic::{AtomicBool, Ordering},
+};
 
 use autosplats_cloud::{Error, guard};
 use laz::{
     LazItem, LazItemType, LazVlr,
-    laszip::ChunkTable,
     record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor},
 };
 
 use super::super::Job;
 use super::{
+    chunks::{Chunk, Chunks},
     columns::{BATCH, Columns, preview},
     gps_time::GpsTime11,
     header::Header,
-    point14::{self, Point14},
+    point14::Point14,
     records::Records,
 };
 
@@ -33,46 +37,52 @@ const MAX_CHUNKS: usize = 1 << 10;
 /// Most points per byte of the file. Real data need a byte or more per point, but a chunk of equal points far less.
 const MAX_RATIO: u64 = 1024;
 
-/// A run of records that can only be decompressed from its beginning.
-struct Chunk {
-    bytes: Range<usize>,
-    points: usize,
-    /// Whether the lengths in the chunk are impossible.
-    inconsistent: bool,
-}
-
 /// The compressed points of a file.
 pub(super) struct Compressed<'a> {
     /// Number of points in the chunks, and number of further points that the header claims.
     pub(super) points: usize,
     pub(super) missing: u64,
+    /// Whether the chunks are known to have more points than the header states.
+    pub(super) more: bool,
+    /// Note on the chunks.
+    pub(super) note: Option<String>,
     bytes: &'a [u8],
     record_len: usize,
     items: Vec<LazItem>,
     chunks: Vec<Chunk>,
+    chunked: bool,
 }
 
 impl<'a> Compressed<'a> {
-    /// Finds the chunks; `None` if there are no points.
-    pub(super) fn open(job: &Job<'a>, header: &Header, records: &Records<'a>) -> Result<Option<Self>, Error> {
-        if header.points == 0 {
+    /// Finds the chunks; `None` if there are no points. Unless `thorough`, nothing is decompressed.
+    pub(super) fn open(
+        job: &Job<'a>,
+        header: &Header,
+        records: &Records<'a>,
+        thorough: bool,
+    ) -> Result<Option<Self>, Error> {
+        if header.stated == 0 && header.end <= header.point_data + header.record_len {
             return Ok(None);
         }
         let fail = |what: String| job.malformed(format!("byte {}", header.point_data), what);
         let (vlr, chunked) = compression(job, header, records)?;
         check_items(vlr.items(), header).map_err(fail)?;
-        if header.points > MAX_RATIO.saturating_mul(job.bytes.len() as u64) {
-            return Err(fail(format!("{} points cannot be in a file of this size", header.points)));
+        if header.stated > MAX_RATIO.saturating_mul(job.bytes.len() as u64) {
+            return Err(fail(format!("{} points cannot be in a file of this size", header.stated)));
         }
-        let chunks = guard(|| chunks(job.bytes, header, &vlr, chunked)).map_err(fail)?;
+        let Chunks { list: chunks, more, note } =
+            guard(|| Chunks::find(job, header, &vlr, chunked, thorough)).map_err(fail)?;
         let points = chunks.iter().map(|chunk| chunk.points).sum();
-        Ok(Some(Self {
+        Ok((points > 0).then(|| Self {
             points,
-            missing: header.points - points as u64,
+            missing: header.stated.saturating_sub(points as u64),
+            more,
+            note,
             bytes: job.bytes,
             record_len: header.record_len,
             items: vlr.items().clone(),
             chunks,
+            chunked,
         }))
     }
 
@@ -82,9 +92,25 @@ impl<'a> Compressed<'a> {
         self.chunks.iter().filter_map(first).collect()
     }
 
-    /// Decompresses all points into columns. Returns the ranges of points that could not be decompressed.
-    pub(super) fn fill(&self, job: &Job<'_>, columns: &mut Columns<'_>) -> Result<Vec<Range<usize>>, Error> {
-        let mut filling = Filling { file: self, job, columns, done: 0, damaged: Vec::new(), why: String::new() };
+    /// Whether bytes of the last chunk are left when its points are decompressed. A run without chunks may end
+    /// anywhere, and layers state their points.
+    fn has_more(&self, chunk: &Chunk, decompressor: &DynDecompressor<'_>) -> bool {
+        let last = self.chunks.last().is_some_and(|last| last.bytes == chunk.bytes);
+        self.chunked && last && !layered(&self.items) && decompressor.get().position() < chunk.bytes.len() as u64
+    }
+
+    /// Decompresses all points into columns. Returns the ranges of points that could not be decompressed, and whether
+    /// some chunk has more points than are read.
+    pub(super) fn fill(&self, job: &Job<'_>, columns: &mut Columns<'_>) -> Result<(Vec<Range<usize>>, bool), Error> {
+        let mut filling = Filling {
+            file: self,
+            job,
+            columns,
+            done: 0,
+            damaged: Vec::new(),
+            why: String::new(),
+            more: AtomicBool::new(self.more),
+        };
         let mut rest = &self.chunks[..];
         while let Some(first) = rest.first() {
             if first.points > BATCH {
@@ -101,11 +127,11 @@ impl<'a> Compressed<'a> {
             filling.batch(batch)?;
             rest = after;
         }
-        let Filling { damaged, why, .. } = filling;
+        let Filling { damaged, why, more, .. } = filling;
         if damaged.iter().map(ExactSizeIterator::len).sum::<usize>() == self.points {
             return Err(job.malformed("point 1", why));
         }
-        Ok(damaged)
+        Ok((damaged, more.into_inner()))
     }
 }
 
@@ -119,13 +145,14 @@ struct Filling<'a, 'b> {
     damaged: Vec<Range<usize>>,
     /// Fault of the first damaged chunk.
     why: String,
+    more: AtomicBool,
 }
 
 impl Filling<'_, '_> {
     /// Decompresses chunks in parallel.
     fn batch(&mut self, chunks: &[Chunk]) -> Result<(), Error> {
         self.tick()?;
-        let file = self.file;
+        let (file, more) = (self.file, &self.more);
         let counts: Vec<usize> = chunks.iter().map(|chunk| chunk.points).collect();
         let outcomes = self.columns.fill(self.done, &counts, |index, piece| {
             let chunk = &chunks[index];
@@ -142,6 +169,7 @@ impl Filling<'_, '_> {
                     piece.take(records);
                     left -= records.len() / file.record_len;
                 }
+                more.fetch_or(file.has_more(chunk, &*decompressor), Ordering::Relaxed);
                 Ok(())
             })
         });
@@ -201,6 +229,7 @@ impl Filling<'_, '_> {
             }
             preview(self.job, self.columns, start, self.done - start)?;
         }
+        self.more.fetch_or(file.has_more(chunk, &*decompressor), Ordering::Relaxed);
         Ok(())
     }
 
@@ -233,7 +262,7 @@ fn compression(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Result<
 }
 
 /// Whether chunks store each kind of value apart, as those of point formats 6 and up do.
-fn layered(items: &[LazItem]) -> bool {
+pub(super) fn layered(items: &[LazItem]) -> bool {
     items.first().is_some_and(|item| item.version() >= 3)
 }
 
@@ -258,70 +287,8 @@ fn check_items(items: &[LazItem], header: &Header) -> Result<(), String> {
     }
 }
 
-/// Finds the chunks. Later code trusts only what is checked here.
-fn chunks(bytes: &[u8], header: &Header, vlr: &LazVlr, chunked: bool) -> Result<Vec<Chunk>, String> {
-    let points = usize::try_from(header.points).map_err(|_| "too many points".to_owned())?;
-    let cut = || "the file ends before its chunk table; it is cut off, copy it again".to_owned();
-    if !chunked {
-        return Ok(vec![Chunk { bytes: header.point_data..bytes.len(), points, inconsistent: false }]);
-    }
-    let start = header.point_data + 8;
-    let offset_at = |at: usize| Some(i64::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
-    // A writer that cannot seek back leaves -1 and stores the offset at the very end.
-    let inside = |offset: &i64| usize::try_from(*offset).is_ok_and(|at| at >= start && at < bytes.len());
-    let table = offset_at(header.point_data)
-        .filter(inside)
-        .or_else(|| offset_at(bytes.len().checked_sub(8)?).filter(inside))
-        .and_then(|offset| usize::try_from(offset).ok())
-        .ok_or_else(cut)?;
-    let count = bytes.get(table + 4..).and_then(|rest| rest.first_chunk()).copied().map(u32::from_le_bytes);
-    let count = count.ok_or_else(cut)? as usize;
-    if count > (bytes.len() - start) / header.record_len {
-        // Every chunk begins with one uncompressed record.
-        return Err(format!("{count} chunks cannot be in a file of this size"));
-    }
-    let variable = vlr.uses_variable_size_chunks();
-    let entries = ChunkTable::read(&mut Cursor::new(&bytes[table..]), variable).map_err(|error| error.to_string())?;
-
-    let mut chunks = Vec::new();
-    let (mut at, mut left) = (start, points);
-    for entry in entries.as_ref() {
-        let fail = |what: &str| format!("chunk {} {what}; the file is damaged, copy it again", chunks.len() + 1);
-        let end = usize::try_from(entry.byte_count).ok().and_then(|len| at.checked_add(len));
-        let end = end.filter(|&end| end <= table).ok_or_else(|| fail("reaches beyond the points"))?;
-        let held = if variable { entry.point_count } else { vlr.chunk_size().into() };
-        let held = usize::try_from(held).map_or(left, |held| held.min(left));
-        if held > 0 {
-            let inconsistent = layered(vlr.items()) && !layers_fit(&bytes[at..end], vlr.items(), header.record_len);
-            chunks.push(Chunk { bytes: at..end, points: held, inconsistent });
-        }
-        at = end;
-        left -= held;
-    }
-    if left == points {
-        return Err(format!("the chunks hold none of {points} points; the file is cut off, copy it again"));
-    }
-    Ok(chunks)
-}
-
-/// Whether the layers of a chunk fit into it. Their lengths follow the first record and the number of points, and the
-/// decompressor allocates what they claim.
-pub(super) fn layers_fit(chunk: &[u8], items: &[LazItem], record_len: usize) -> bool {
-    let layers: usize = items
-        .iter()
-        .map(|item| match item.item_type() {
-            LazItemType::Point14 => point14::LAYERS,
-            LazItemType::RGBNIR14 => 2,
-            LazItemType::Byte14(count) => count.into(),
-            _ => 1,
-        })
-        .sum();
-    let Some(sizes) = chunk.get(record_len + 4..record_len + 4 + 4 * layers) else { return false };
-    let claimed: u64 = sizes.as_chunks::<4>().0.iter().map(|&size| u64::from(u32::from_le_bytes(size))).sum();
-    claimed <= (chunk.len() - record_len - 4 - 4 * layers) as u64
-}
-
-pub(super) type Decompressor<'a> = Box<dyn RecordDecompressor<Cursor<&'a [u8]>> + Send + Sync + 'a>;
+type DynDecompressor<'a> = dyn RecordDecompressor<Cursor<&'a [u8]>> + Send + Sync + 'a;
+pub(super) type Decompressor<'a> = Box<DynDecompressor<'a>>;
 
 /// Makes a decompressor. Items on which damage would overflow the crate's stack are decoded by this project's code.
 pub(super) fn decompressor<'a>(items: &[LazItem], chunk: &'a [u8]) -> Result<Decompressor<'a>, String> {

@@ -9,6 +9,7 @@
 //! The origin of the positions is chosen in advance. It is the middle of the claimed bounds if a sample of the points
 //! agrees, otherwise the middle of the sample.
 
+mod chunks;
 mod columns;
 mod coordinates;
 mod describe;
@@ -20,7 +21,7 @@ mod laz;
 mod point14;
 mod records;
 
-use autosplats_cloud::{Contents, Error, sampled_middle};
+use autosplats_cloud::{Contents, Error, Unit, degree_origin, sampled_middle};
 use glam::DVec3;
 
 use self::{
@@ -49,34 +50,41 @@ pub(super) const FORMAT: Format = Format {
 };
 
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
-    let header = Header::read(job)?;
+    let mut header = Header::read(job)?;
     let records = Records::read(job.bytes, &header);
     let (dimensions, mut notes) = dimensions(&header, &records);
     notes.extend(records.notes.iter().cloned());
-    let compressed = if header.compressed { Compressed::open(job, &header, &records)? } else { None };
+    let compressed = if header.compressed { Compressed::open(job, &header, &records, true)? } else { None };
     let (points, lost) = match &compressed {
         Some(compressed) => (compressed.points, compressed.missing),
         None => complete(job, &header)?,
     };
+    if let Some(compressed) = &compressed {
+        notes.extend(compressed.note.clone());
+        header.points = header.points.max(points as u64);
+    }
+    notes.extend(header.more_than_stated(compressed.as_ref().map_or(header.held, |compressed| compressed.points)));
     let exact = job.options.exact;
     let colors = las::colors(header.format).map_or(0, |_| if exact { 9 } else { 3 });
     let fields: usize = dimensions.iter().map(Dimension::size).sum();
     job.check_memory(points, if exact { 24 } else { 12 } + colors + fields)?;
 
+    let meaning = coordinates::of(&header, &records);
+    let degrees = meaning.crs.unit == Some(Unit::Degree);
     let records_at = |i: usize| &job.bytes[header.point_data + i * header.record_len..];
     let origin = match &compressed {
         Some(compressed) => {
             let first = compressed.first_records();
-            origin(&header, first.len(), |i| header.world(first[i]))
+            origin(&header, degrees, first.len(), |i| header.world(first[i]))
         }
-        None => origin(&header, points, |i| header.world(records_at(i))),
+        None => origin(&header, degrees, points, |i| header.world(records_at(i))),
     };
     let mut columns = Columns::new(&header, origin, exact, dimensions, points)?;
-    let damaged = match &compressed {
+    let (damaged, more) = match &compressed {
         Some(compressed) => compressed.fill(job, &mut columns)?,
         None => {
             uncompressed(job, &header, &mut columns, points)?;
-            Vec::new()
+            (Vec::new(), false)
         }
     };
 
@@ -84,6 +92,9 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let (cloud, narrow) = columns.into_cloud()?;
     notes.extend(narrow);
     let claimed = header.points;
+    if more {
+        notes.push(format!("the header states {claimed} points, but the compressed data hold more; they are left out"));
+    }
     if lost > 0 {
         notes.push(format!("the file is cut off: {lost} of {claimed} points are lost; copy it again"));
     }
@@ -93,7 +104,6 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
             "compressed data are damaged: {damaged_points} of {claimed} points are lost; copy the file again"
         ));
     }
-    let meaning = coordinates::of(&header, &records);
     notes.extend(meaning.notes);
     notes.iter().for_each(|note| job.note(note));
     Ok(cloud.with_crs(meaning.crs).with_resolution(header.scale.abs()).into())
@@ -111,7 +121,10 @@ fn complete(job: &Job<'_>, header: &Header) -> Result<(usize, u64), Error> {
 }
 
 /// The origin of the positions; `sample` gives the coordinates of some points.
-fn origin(header: &Header, count: usize, sample: impl Fn(usize) -> DVec3) -> DVec3 {
+fn origin(header: &Header, degrees: bool, count: usize, sample: impl Fn(usize) -> DVec3) -> DVec3 {
+    if degrees {
+        return degree_origin(count, sample);
+    }
     let middle = sampled_middle(count, sample);
     match header.sane_bounds() {
         Some([low, high])

@@ -44,7 +44,11 @@ impl Layout {
         if len == 0 {
             return Err(job.malformed("byte 0", "the file is empty; copy it again"));
         }
-        if let Some(names) = columns::given(job)? {
+        if let Some(columns::Given { names, open }) = columns::given(job)? {
+            if open {
+                let what = "--columns ends in '...', but the length of these records has to be known; name all columns";
+                return Err(job.unsupported(what));
+            }
             let stride = SIZE * names.len();
             if !len.is_multiple_of(stride) {
                 let what = format!(

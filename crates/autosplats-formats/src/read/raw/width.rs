@@ -145,8 +145,12 @@ mod tests {
         // Two lasers: every other point is nearer than the next.
         let turn = |point: usize, column: usize| {
             let angle = (point / 2) as f32 * 0.01;
-            [9.0 * angle.cos(), 9.0 * angle.sin(), if point % 2 == 0 { -1.0 } else { -1.02 }, 0.1 + 0.01 * angle]
-                [column]
+            [
+                9.0 * angle.cos(),
+                9.0 * angle.sin(),
+                if point.is_multiple_of(2) { -1.0 } else { -1.02 },
+                0.1 + 0.01 * angle,
+            ][column]
         };
         assert_eq!(Width::of(&bytes(3000, 4, turn)), Width::Known(4), "in turn");
     }

@@ -3,14 +3,20 @@
 //! The text is cut into pieces at line ends. The pieces are parsed in parallel, each into columns of its own, which are
 //! appended to the cloud's columns in order. Besides the cloud, only one batch of pieces is in memory.
 
-use autosplats_cloud::{Error, FieldValues, PointCloud, excerpt, residual, storage_origin};
+use autosplats_cloud::{Crs, Error, FieldValues, PointCloud, Unit, degree_origin, excerpt, residual, storage_origin};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::{Job, table::reserve, text};
+use super::super::{
+    Job,
+    table::reserve,
+    text,
+    units::{LOOKS_LIKE_DEGREES, look_like_degrees},
+};
 use super::{
-    cells::{Separator, is_missing, trimmed},
+    cells::{Separator, is_comment, is_count, is_missing, trimmed},
     layout::{Layout, Target},
+    preamble::is_words,
 };
 use crate::color_scale::ColorScale;
 
@@ -29,16 +35,20 @@ const MAX_LINE: usize = 1 << 16;
 /// Places in the text sampled to find the middle of the points.
 const PLACES: usize = 1024;
 
+/// Heights that models write where there is none.
+const NO_HEIGHTS: [f64; 4] = [-9999.0, -99999.0, -32767.0, -32768.0];
+
 /// Reads the rows from byte `start` on.
 pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Option<usize>) -> Result<PointCloud, Error> {
     let text = job.bytes;
-    let (origin, row_len) = survey(job, layout, start);
+    let Survey { origin, crs, row_len } = survey(job, layout, start);
     job.check_memory((text.len() - start) / row_len, layout.bytes_per_point(job.options.exact))?;
     let parser = Parser { layout, origin, exact: job.options.exact, counts_between: promised.is_some() };
     let mut all = Columns::new(layout);
     let mut counts_between = 0_usize;
+    let mut without = Without::default();
     let mut at = start;
-    while at < text.len() {
+    'text: while at < text.len() {
         job.tick(PARSING * (at - start) as f32 / (text.len() - start) as f32)?;
         let mut cuts = vec![at];
         while at < text.len() && cuts.len() <= BATCH {
@@ -52,16 +62,97 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
             chunk.into_cloud(&Job { progress: &(), ..*job }, layout, origin, false)
         })?;
         for piece in pieces {
-            if let Some((offset, what)) = piece.error {
-                return Err(job.malformed(job.line(offset), what));
-            }
             all.append(&piece.columns)?;
             counts_between = counts_between.saturating_add(piece.counts);
+            without.add(piece.without);
+            if let Some((offset, what)) = piece.error {
+                let Some(lines) = words_at_end(text, offset) else {
+                    return Err(job.malformed(job.line(offset), what));
+                };
+                let lines = if lines == 1 { "a line".into() } else { format!("{lines} lines") };
+                job.note(format!("{lines} of words from {} on, after the points; skipped", job.line(offset)));
+                break 'text;
+            }
         }
     }
+    without.check(job, all.positions.len())?;
     check_promise(job, all.positions.len(), promised, counts_between)?;
     job.tick(PARSING)?;
-    all.into_cloud(job, layout, origin, job.options.exact)
+    let mut cloud = all.into_cloud(job, layout, origin, job.options.exact)?.with_crs(crs);
+    drop_no_heights(job, &mut cloud);
+    Ok(cloud)
+}
+
+/// Drops points whose height stands for none, which is told by the heights of the others: they span less than they are
+/// away from it.
+fn drop_no_heights(job: &Job<'_>, cloud: &mut PointCloud) {
+    let up = cloud.origin().z;
+    let height = |point: &[f32; 3]| f64::from(point[2]) + up;
+    // Such a height is the lowest of all, which is soon found out.
+    let lowest = |points: &[[f32; 3]]| points.iter().fold(f32::INFINITY, |low, point| low.min(point[2]));
+    let lowest = cloud.positions().par_chunks(PIECE).map(lowest).reduce(|| f32::INFINITY, f32::min);
+    if !NO_HEIGHTS.contains(&(f64::from(lowest) + up)) {
+        return;
+    }
+    let none = [(f64::INFINITY, f64::NEG_INFINITY); 2];
+    // The range of the heights that stand for none, and that of the others.
+    let add = |mut ranges: [(f64, f64); 2], point: &[f32; 3]| {
+        let height = height(point);
+        let (low, high) = &mut ranges[usize::from(!NO_HEIGHTS.contains(&height))];
+        (*low, *high) = (low.min(height), high.max(height));
+        ranges
+    };
+    let join = |a: [(f64, f64); 2], b: [(f64, f64); 2]| [0, 1].map(|i| (a[i].0.min(b[i].0), a[i].1.max(b[i].1)));
+    let [marks, others] = cloud.positions().par_iter().fold(|| none, add).reduce(|| none, join);
+    if marks.0 > marks.1 || others.0 > others.1 || !(others.0 - marks.1 > others.1 - others.0) {
+        return;
+    }
+    let keep: Vec<bool> = cloud.positions().par_iter().map(|point| !NO_HEIGHTS.contains(&height(point))).collect();
+    let (before, value) = (keep.len(), marks.0);
+    cloud.retain(|i| keep[i]);
+    let count = before - cloud.len();
+    job.note(format!("{count} of {before} points have the height {value}, which stands for none; left out"));
+}
+
+/// Rows without coordinates.
+#[derive(Default)]
+struct Without {
+    count: usize,
+    /// How many of them hold no value at all.
+    empty: usize,
+    /// The first: its first byte, and what is missing.
+    first: Option<(usize, String)>,
+}
+
+impl Without {
+    fn add(&mut self, other: Self) {
+        self.count += other.count;
+        self.empty += other.empty;
+        self.first = self.first.take().or(other.first);
+    }
+
+    /// Tells of them. A text in which most rows are so has other columns than was thought.
+    fn check(self, job: &Job<'_>, points: usize) -> Result<(), Error> {
+        let Some((at, what)) = self.first else { return Ok(()) };
+        let (count, rows) = (self.count, self.count + points);
+        if self.count - self.empty >= points {
+            let what = format!("{what}, as in {count} of {rows} rows; name the columns with --columns");
+            return Err(job.malformed(job.line(at), what));
+        }
+        job.note(format!("{count} of {rows} rows have no coordinates; skipped, the first in {}", job.line(at)));
+        Ok(())
+    }
+}
+
+/// Number of the lines from byte `at` to the end, if all are words and few.
+fn words_at_end(text: &[u8], at: usize) -> Option<usize> {
+    let rest = &text[at..];
+    if rest.len() > MAX_LINE {
+        return None;
+    }
+    let lines = rest.split(|&byte| byte == b'\n').map(text::trim).filter(|line| !text::is_blank(line));
+    let lines: Vec<&[u8]> = lines.collect();
+    lines.iter().all(|line| is_words(line)).then_some(lines.len())
 }
 
 /// Compares the number of rows with the stated counts.
@@ -80,8 +171,16 @@ fn check_promise(job: &Job<'_>, rows: usize, first: Option<usize>, between: usiz
     Ok(())
 }
 
-/// An origin for the points and the mean length of a row in bytes, from rows sampled all over the text.
-fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
+/// What rows sampled all over the text tell.
+struct Survey {
+    /// An origin for the points.
+    origin: DVec3,
+    crs: Crs,
+    /// Mean length of a row in bytes.
+    row_len: usize,
+}
+
+fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> Survey {
     let text = job.bytes;
     let mut points = Vec::new();
     let (mut last, mut bytes) = (None, 0);
@@ -110,9 +209,18 @@ fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
             points.push(DVec3::from(point));
         }
     }
-    let origin = storage_origin(points.len(), |i| points[i]);
+    let mut crs = layout.crs.clone();
+    if crs == Crs::default() && job.options.columns.is_none() && look_like_degrees(points.len(), |i| points[i]) {
+        crs.unit = Some(Unit::Degree);
+        job.note(LOOKS_LIKE_DEGREES);
+    }
+    let origin = if crs.unit == Some(Unit::Degree) {
+        degree_origin(points.len(), |i| points[i])
+    } else {
+        storage_origin(points.len(), |i| points[i])
+    };
     // The shortest row has three digits, each followed by a byte.
-    (origin, bytes.checked_div(points.len()).unwrap_or(0).max(6))
+    Survey { origin, crs, row_len: bytes.checked_div(points.len()).unwrap_or(0).max(6) }
 }
 
 impl Layout {
@@ -197,7 +305,6 @@ impl Columns {
             };
             cloud = cloud.with_field(name, values)?;
         }
-        cloud = cloud.with_crs(layout.crs.clone());
         Ok(cloud)
     }
 }
@@ -250,6 +357,7 @@ struct Piece {
     columns: Columns,
     /// Sum of the counts between rows.
     counts: usize,
+    without: Without,
     error: Option<(usize, String)>,
 }
 
@@ -263,58 +371,73 @@ struct Parser<'a> {
 
 impl Parser<'_> {
     fn piece(&self, text: &[u8], start: usize) -> Piece {
-        let mut piece = Piece { columns: Columns::new(self.layout), counts: 0, error: None };
+        let columns = Columns::new(self.layout);
+        let mut piece = Piece { columns, counts: 0, without: Without::default(), error: None };
         let mut fields = vec![0.0; self.layout.fields.len()];
         let mut at = 0;
         while at < text.len() {
             let end = text::line_end(text, at);
             let line = trimmed(&text[at..end]);
-            let empty = line.iter().all(u8::is_ascii_whitespace);
-            if self.counts_between && text::is_count(line.trim_ascii()) {
+            if self.counts_between && is_count(line) {
                 let count = std::str::from_utf8(line.trim_ascii()).ok().and_then(|line| line.parse().ok());
                 piece.counts = piece.counts.saturating_add(count.unwrap_or(usize::MAX));
-            } else if !empty
-                && !text::is_blank(line.trim_ascii_start())
-                && let Err(what) = self.row(line, &mut piece.columns, &mut fields)
-            {
-                piece.error = Some((start + at, what));
-                break;
+            } else if !(line.is_empty() || matches!(line[0], b'#' | b'/' | b' ' | b'\t') && is_comment(line)) {
+                match self.row(line, &mut piece.columns, &mut fields) {
+                    Ok(()) => {}
+                    Err(Odd::Without(what)) => {
+                        let empty = self.layout.dialect.cells(line).all(<[u8]>::is_empty);
+                        let first = Some((start + at, what));
+                        piece.without.add(Without { count: 1, empty: usize::from(empty), first });
+                    }
+                    Err(Odd::Broken(what)) => {
+                        piece.error = Some((start + at, what));
+                        break;
+                    }
+                }
             }
             at = end + 1;
         }
         piece
     }
 
-    fn row(&self, line: &[u8], columns: &mut Columns, fields: &mut [f64]) -> Result<(), String> {
-        let Layout { dialect, targets, .. } = self.layout;
-        let mut cells = dialect.cells(line);
+    fn row(&self, line: &[u8], columns: &mut Columns, fields: &mut [f64]) -> Result<(), Odd> {
+        let Layout { dialect, targets, open, .. } = self.layout;
+        let mut cells = dialect.cells(text::without_mark(line));
         let (mut world, mut color) = (DVec3::ZERO, [0.0; 3]);
+        let mut missing = None;
         for (index, target) in targets.iter().enumerate() {
             let cell = cells.next().ok_or_else(|| {
-                format!("{index} values where a point has {}; complete or remove the line", targets.len())
+                let count = targets.len();
+                Odd::Broken(format!("{index} values where a point has {count}; complete or remove the line"))
             })?;
             // Numbers are tried first, because values are hardly ever missing.
             let value = || match dialect.number(cell) {
                 Err(_) if is_missing(cell) => Ok(f64::NAN),
-                value => value,
+                value => value.map_err(Odd::Broken),
             };
             match *target {
                 Target::Skip => {}
-                Target::Axis(axis) => {
-                    world[axis] = dialect.number(cell).map_err(|what| {
-                        if is_missing(cell) { format!("{} is missing", ["x", "y", "z"][axis]) } else { what }
-                    })?;
-                }
+                Target::Axis(axis) => match dialect.number(cell) {
+                    Ok(number) => world[axis] = number,
+                    Err(_) if is_missing(cell) => missing = missing.or(Some(axis)),
+                    Err(what) => return Err(Odd::Broken(what)),
+                },
                 Target::Channel(channel) => color[channel] = value()?,
                 Target::Field(field) => fields[field] = value()?,
             }
         }
-        if let Some(more) = cells.next() {
+        if !open && let Some(more) = cells.next() {
             let trailing = dialect.separator != Separator::Any && more.is_empty() && cells.next().is_none();
             if !trailing {
-                let what = format!("more values than the {} a point has, from '{}' on", targets.len(), excerpt(more));
-                return Err(what);
+                let count = targets.len();
+                return Err(Odd::Broken(format!(
+                    "more values than the {count} a point has, from '{}' on; '...' at the end of --columns leaves them out",
+                    excerpt(more)
+                )));
             }
+        }
+        if let Some(axis) = missing {
+            return Err(Odd::Without(format!("{} is missing", ["x", "y", "z"][axis])));
         }
         columns.positions.push((world - self.origin).as_vec3().to_array());
         if self.exact {
@@ -331,6 +454,14 @@ impl Parser<'_> {
         }
         Ok(())
     }
+}
+
+/// Why a row is no point.
+enum Odd {
+    /// A coordinate is missing.
+    Without(String),
+    /// The row is not of the layout.
+    Broken(String),
 }
 
 impl Colors {

@@ -329,7 +329,7 @@ fn damage_is_an_error_or_other_values() {
                 }
                 _ => {}
             }
-            if is_layered(items) && !super::super::laz::layers_fit(&chunk, items, len) {
+            if is_layered(items) && super::super::chunks::layers(&chunk, items, len).is_none() {
                 continue;
             }
             let places = panics(|| {
