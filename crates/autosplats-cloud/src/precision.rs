@@ -47,8 +47,8 @@ pub fn sampled_middle(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
     DVec3::new(median(0), median(1), median(2))
 }
 
-/// The values of a field in `f32`, relative to a value among them. Times of day or of an era in seconds have more digits
-/// than `f32` holds.
+/// The values of a field in `f32`, relative to a value among them. Times of an era in seconds have more digits than
+/// `f32` holds.
 ///
 /// # Examples
 ///

@@ -116,10 +116,10 @@ impl ColorScale {
     /// Note on values that are clipped, if there are any.
     pub(crate) fn note(self) -> Option<String> {
         let clipped = self.levels.above[self.index];
-        let values = if clipped == 1 { "value exceeds" } else { "values exceed" };
+        let exceed = if clipped == 1 { "exceeds" } else { "exceed" };
         (clipped > 0).then(|| {
             format!(
-                "{clipped} of {} colour {values} {}, full brightness of the others; clipped",
+                "{clipped} of {} colour values {exceed} {}, full brightness of the others; clipped",
                 self.levels.positive,
                 self.full()
             )

@@ -137,12 +137,15 @@ pub(super) fn is_known(name: &str) -> bool {
     names::field(&plain).is_some() || names::COLORS.iter().any(|channels| names::contains(channels, &plain))
 }
 
-/// Attributes whose names differ: an underscore is added to each that comes again, as to the fields of a cloud.
+/// Suffix of a name that comes again though it has a meaning, as `x`.
+pub(super) const AGAIN: &str = "_2";
+
+/// Attributes whose names differ: a suffix is added to each that comes again, as to the fields of a cloud.
 pub(super) fn unrepeated(attributes: impl Iterator<Item = Attribute>) -> Vec<Attribute> {
     let mut all: Vec<Attribute> = Vec::new();
     for mut attribute in attributes.take(MAX_COLUMNS) {
-        while all.iter().any(|other| other.name == attribute.name) {
-            attribute.name.push('_');
+        while all.iter().any(|other| other.name.eq_ignore_ascii_case(&attribute.name)) {
+            attribute.name.push_str(AGAIN);
         }
         all.push(attribute);
     }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 pub use super::columns::{MAX_COLUMNS, numbered};
 use super::{
     Attribute, Job, ReadOptions,
-    columns::{field_name, find_axes, find_color, is_longitude},
+    columns::{AGAIN, field_name, find_axes, find_color, is_longitude},
     text::is_packed_color,
     units::{LOOKS_LIKE_DEGREES, look_like_degrees},
 };
@@ -235,12 +235,13 @@ impl Table<'_> {
             step += 1;
             // Two columns may map to one name, as `intensity` and `scalar_Intensity` do.
             let mut name = field_name(&column.name);
-            if known.contains(&name.to_lowercase()) {
-                job.note(format!("there is more than one {name}; the first is read, another is kept as {name}_"));
-                name.push('_');
+            let again = known.contains(&name.to_lowercase());
+            if again {
+                job.note(format!("there is more than one {name}; the first is read, another is kept as {name}{AGAIN}"));
+                name.push_str(AGAIN);
             }
             while cloud.fields().iter().any(|field| field.name == name) {
-                name.push('_');
+                name.push_str(if again { AGAIN } else { "_" });
             }
             cloud = cloud.with_field(name, values)?;
         }

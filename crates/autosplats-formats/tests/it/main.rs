@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
 mod choosing;
+mod color_scales;
 mod common;
 mod depth_images;
 mod e57;

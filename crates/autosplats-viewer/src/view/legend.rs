@@ -122,7 +122,7 @@ mod tests {
         assert_eq!(labels(406_123.25, 406_123.75, 5.0).first().map(String::as_str), Some("406123.3"), "far from zero");
         assert_eq!(labels(7.0, 7.0, 5.0), ["7.0000"], "one value");
         let seconds = labels(1.7e9 + 3.0, 1.7e9 + 21.0, 3.0);
-        assert_eq!(seconds, ["1700000005", "1700000010", "1700000015", "1700000020"], "seconds of an era");
+        assert_eq!(seconds, ["1700000010", "1700000020"], "seconds of an era");
         for (low, high) in [(0.001, 0.0037), (-5.0, 1e6), (1e-9, 3e-9), (99.5, 101.0)] {
             let found = ticks(low, high, 8.0);
             assert!((3..=9).contains(&found.len()), "{low} to {high}: {found:?}");

@@ -39,8 +39,8 @@ pub(super) struct Walked {
     pub(super) end: usize,
 }
 
-/// Walks through the records of an element with lists, or through those that the file holds of them. `keep` receives the
-/// bytes of each value that is no list, also in a record that is incomplete.
+/// Walks through the records of an element with lists, as far as the file holds them. `keep` receives the bytes of each
+/// value that is no list, also in a record that is incomplete.
 pub(super) fn walk(
     job: &Job<'_>,
     header: &Header,
