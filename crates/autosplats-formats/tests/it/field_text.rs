@@ -55,7 +55,7 @@ const POINTS: [[f64; 3]; 3] = [[1.5, 2.0, 3.0], [4.0, 5.25, 6.0], [7.0, 8.0, 9.1
 /// Rows of 12 points that no rule can take for a count or a colour, each made by `row` of its number and coordinates.
 fn rows(row: impl Fn(usize, [f64; 3]) -> String) -> (String, Vec<[f64; 3]>) {
     let points: Vec<[f64; 3]> =
-        (0..12).map(|i| f64::from(i)).map(|i| [i * 0.25 % 1.0 + 10.5, 20.25 - i * i % 7.0, 30.125 + i * 0.5]).collect();
+        (0..12).map(f64::from).map(|i| [i * 0.25 % 1.0 + 10.5, 20.25 - i * i % 7.0, 30.125 + i * 0.5]).collect();
     (points.iter().enumerate().map(|(i, &point)| row(i, point)).collect(), points)
 }
 

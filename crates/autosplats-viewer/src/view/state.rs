@@ -164,7 +164,7 @@ mod tests {
         let clip = ClipBox { rotation: DQuat::from_rotation_z(0.7), ..ClipBox::new(DVec3::ZERO, DVec3::ONE) };
         let mut clock = Clock::default();
         (clock.speed, clock.looped) = (0.25, false);
-        let state = State { inputs, up: Some(Up::Y), clip: Some(clip), clock: Some(clock), ..State::default() };
+        let state = State { inputs, up: Some(Up(Axes::YUp)), clip: Some(clip), clock: Some(clock), ..State::default() };
         state.write(&path).expect("written");
         assert_eq!(State::read(&path), Ok(state), "as it was");
         let older = r#"{"inputs": [{"source": "a.ply"}], "camera": null, "up": "z-up", "keys": []}"#;

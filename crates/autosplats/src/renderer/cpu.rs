@@ -70,16 +70,15 @@ impl CpuRenderer {
         self.view.as_ref().map_or_else(Vec::new, |view| point_surfels(&self.surfels, view))
     }
 
-    /// See [`Renderer::render_while`](super::Renderer::render_while). The planes in `given` replace search and fit. A
-    /// unit of the cloud is `unit` world units.
+    /// See [`Renderer::render_while`](super::Renderer::render_while). The planes in `given` replace search and fit. The
+    /// cloud comes with the length of its unit in world units.
     pub(super) fn render(
         &mut self,
-        cloud: &PointCloud,
+        (cloud, unit): (&PointCloud, f64),
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
         given: Option<GivenPlanes<'_>>,
-        unit: f64,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let picture = check(cloud, camera, size, settings)?;

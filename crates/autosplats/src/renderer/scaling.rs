@@ -140,10 +140,10 @@ impl Renderer {
             (BackendRenderer::Cpu(renderer), Some(given)) => {
                 let radius: Vec<f32> = given.radius.iter().map(|&radius| scaling.length(radius)).collect();
                 let given = Some(GivenPlanes { radius: &radius, ..given });
-                renderer.render(shown, &camera, size, &settings, given, unit, go_on)
+                renderer.render((shown, unit), &camera, size, &settings, given, go_on)
             }
             (BackendRenderer::Cpu(renderer), None) => {
-                renderer.render(shown, &camera, size, &settings, None, unit, go_on)
+                renderer.render((shown, unit), &camera, size, &settings, None, go_on)
             }
             (BackendRenderer::Gpu(renderer), None) => renderer.render(shown, &camera, size, &settings, unit, go_on),
             (BackendRenderer::Gpu(_), Some(_)) => {

@@ -216,7 +216,7 @@ fn street_at(azimuth: f64) -> (f64, f64) {
     let number = (azimuth * 11.0) as usize;
     if number % 9 == 4 {
         (6.0 / side.max(0.4), 1.5)
-    } else if number % 5 == 0 {
+    } else if number.is_multiple_of(5) {
         (60.0, 12.0)
     } else {
         (9.0 / side, 8.0)
