@@ -4,8 +4,8 @@ use crate::common::{Folder, data, ply};
 
 /// A wall of ground and building, and a speck of noise far above it: the file's points and how many are noise.
 fn wall(classes: &str) -> String {
-    let wall =
-        (0..400).map(|i| format!("{} {} {} {}", i % 20, 0.1 * f64::from(i % 7), i / 20, if i < 200 { 2 } else { 6 }));
+    let wall = (0..400)
+        .map(|i| format!("{} {} {} {}", i % 20, 0.1 * f64::from(i % 7), 1 + i / 20, if i < 200 { 2 } else { 6 }));
     let noise = (0..40).map(|i| format!("{} 0 {} 7", 0.1 * f64::from(i % 5), 900.0 + 0.1 * f64::from(i / 5)));
     ply(&["float x", "float y", "float z", &format!("uchar {classes}")], wall.chain(noise))
 }

@@ -30,8 +30,8 @@ const BLOCK: usize = 1 << 16;
 /// A hyphen before a word leaves its points out. Of the words without a hyphen, a kept point matches one for classes,
 /// one for flags and one for returns, as far as there are such words. `all` and `usual` stand alone.
 ///
-/// Of other words, classes are in a field called `Classification`, `class` or `label`; flags and returns are in fields with the names
-/// of PDAL: `Withheld`, `ReturnNumber` … Letter case and separators do not matter.
+/// Classes are in a field called `Classification`, `class` or `label`; `usual` takes the first name only. Flags and
+/// returns are in fields with the names of PDAL: `Withheld`, `ReturnNumber` … Letter case and separators do not matter.
 ///
 /// # Examples
 ///

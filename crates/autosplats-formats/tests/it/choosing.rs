@@ -15,6 +15,7 @@ fn las(version: (u8, u8), format: u8, compressed: bool, times: usize) -> Vec<u8>
     let mut builder = las::Builder::from(version);
     builder.point_format = las::point::Format::new(format).unwrap();
     builder.point_format.is_compressed = compressed;
+    let format = builder.point_format;
     let mut writer = las::Writer::new(std::io::Cursor::new(Vec::new()), builder.into_header().unwrap()).unwrap();
     for (x, &(class, is_withheld, number)) in POINTS.iter().enumerate().flat_map(|point| vec![point; times]) {
         let point = las::Point {
@@ -25,18 +26,15 @@ fn las(version: (u8, u8), format: u8, compressed: bool, times: usize) -> Vec<u8>
             is_withheld,
             return_number: number,
             number_of_returns: 2,
-            gps_time: builder_has_time(format).then_some(1.0),
-            color: matches!(format, 2 | 3 | 7 | 8).then(Default::default),
+            gps_time: format.has_gps_time.then_some(1.0),
+            color: format.has_color.then(Default::default),
+            nir: format.has_nir.then_some(1),
             ..Default::default()
         };
         writer.write_point(point).unwrap();
     }
     writer.close().unwrap();
     writer.into_inner().unwrap().into_inner()
-}
-
-fn builder_has_time(format: u8) -> bool {
-    !matches!(format, 0 | 2)
 }
 
 fn options(keep: &str) -> ReadOptions {
