@@ -94,18 +94,19 @@ fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<
     let looked =
         files.into_par_iter().filter(|file| is_named_as_cloud(file)).map(|file| (describe(&file, options), file));
     let looked: Vec<_> = looked.collect();
-    // Pictures beside clouds often have a layer of depths.
-    let is_image = |described: &Description| described.format.starts_with("depth image");
-    let has_clouds = looked.iter().any(|(described, _)| described.as_ref().is_ok_and(|found| !is_image(found)));
     let (mut kept, mut sound, mut reason) = (Vec::new(), false, None);
     for (described, file) in looked {
         match described {
-            Ok(found) if has_clouds && is_image(&found) => continue,
-            Ok(_) => sound = true,
-            Err(Error::UnknownFormat { .. } | Error::Unsupported { .. }) => continue,
-            Err(error) => reason = reason.or(Some(error)),
+            Ok(Description { format, .. }) => {
+                sound = true;
+                kept.push((file, format));
+            }
+            Err(Error::UnknownFormat { .. } | Error::Unsupported { .. }) => {}
+            Err(error) => {
+                reason = reason.or(Some(error));
+                kept.push((file, String::new()));
+            }
         }
-        kept.push(file);
     }
     if !sound {
         return Err(no_frames(match reason {
@@ -114,10 +115,17 @@ fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<
         }));
     }
     // Pose and camera files beside numbered frames may look like text files of points.
-    let numbered =
-        |file: &PathBuf| file.file_stem().is_some_and(|s| s.to_string_lossy().contains(|c: char| c.is_ascii_digit()));
+    let numbered = |(file, _): &(PathBuf, String)| {
+        file.file_stem()
+            .is_some_and(|stem| stem.to_string_lossy().contains(|character: char| character.is_ascii_digit()))
+    };
     if kept.iter().any(numbered) {
         kept.retain(numbered);
     }
-    Ok(kept)
+    // Pictures beside clouds often have a layer of depths. Text beside depth images holds poses.
+    let is_image = |(_, format): &(PathBuf, String)| format.starts_with("depth image");
+    if kept.iter().any(|file| !file.1.is_empty() && file.1 != "text" && !is_image(file)) {
+        kept.retain(|file| !is_image(file));
+    }
+    Ok(kept.into_iter().map(|(file, _)| file).collect())
 }

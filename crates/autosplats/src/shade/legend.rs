@@ -10,8 +10,24 @@ use super::{Background, Image, Shading};
 const LABELS: usize = 5;
 /// Side of a character in font pixels.
 const GLYPH: usize = 8;
-const INK: [u8; 4] = [240, 240, 240, 255];
-const SHADE: [u8; 4] = [24, 26, 30, 255];
+
+/// Colours of text and panel.
+#[derive(Clone, Copy)]
+struct Inks {
+    text: [u8; 4],
+    panel: [u8; 4],
+}
+
+const ON_DARK: Inks = Inks { text: [240, 240, 240, 255], panel: [24, 26, 30, 255] };
+const ON_LIGHT: Inks = Inks { text: [20, 22, 26, 255], panel: [244, 244, 244, 255] };
+
+impl Inks {
+    /// Those that suit the background half-way down the picture.
+    fn on(behind: Background) -> Self {
+        let [red, green, blue, alpha] = background(behind, 0.5).map(u32::from);
+        if alpha > 0 && 3 * red + 6 * green + blue > 10 * 128 { ON_LIGHT } else { ON_DARK }
+    }
+}
 
 /// Draws the legend where it hides the least of the surface, at best in the middle of the right edge. A picture too
 /// small gets none. `world` turns values of the scale into those of the world.
@@ -48,14 +64,16 @@ pub(super) fn draw(
         [right, line].into_iter().flat_map(|x| [(height - panel_height) / 2, line / 2, bottom].map(|y| [x, y]));
     let hidden = |&place: &[usize; 2]| hidden(image, shading.background, place, [panel_width, panel_height]);
     let [x0, y0] = places.min_by_key(hidden).unwrap_or_default();
+    let inks = Inks::on(shading.background);
     for y in y0..y0 + panel_height {
         for pixel in &mut image.pixels[y * width + x0..][..panel_width] {
-            *pixel = if pixel[3] == 0 { [SHADE[0], SHADE[1], SHADE[2], 190] } else { blend(*pixel, SHADE) };
+            let [red, green, blue, _] = inks.panel;
+            *pixel = if pixel[3] == 0 { [red, green, blue, 190] } else { blend(*pixel, inks.panel) };
         }
     }
     let x = x0 + line / 2;
     let top = y0 + 2 * line;
-    text(image, title, [x, y0 + line / 2], unit);
+    text(image, title, [x, y0 + line / 2], unit, inks.text);
     for y in 0..bar_height {
         let t = 1.0 - (y as f32 + 0.5) / bar_height as f32;
         let [r, g, b] = scale.color(low + (high - low) * t).map(&encode);
@@ -63,8 +81,8 @@ pub(super) fn draw(
     }
     for (i, label) in &labels {
         let y = top + (bar_height - 1) * i / (LABELS - 1);
-        image.pixels[y * width + x + bar_width..][..3 * unit].fill(INK);
-        text(image, label, [x + bar_width + 5 * unit, y - GLYPH * unit / 2], unit);
+        image.pixels[y * width + x + bar_width..][..3 * unit].fill(inks.text);
+        text(image, label, [x + bar_width + 5 * unit, y - GLYPH * unit / 2], unit, inks.text);
     }
 }
 
@@ -97,7 +115,7 @@ fn blend(below: [u8; 4], above: [u8; 4]) -> [u8; 4] {
     [mix(0), mix(1), mix(2), 255]
 }
 
-fn text(image: &mut Image, text: &str, [x0, y0]: [usize; 2], unit: usize) {
+fn text(image: &mut Image, text: &str, [x0, y0]: [usize; 2], unit: usize, ink: [u8; 4]) {
     let width = image.width as usize;
     for (column, character) in text.chars().enumerate() {
         let glyph = font8x8::BASIC_FONTS.get(character).or_else(|| font8x8::BASIC_FONTS.get('?')).unwrap_or_default();
@@ -105,7 +123,7 @@ fn text(image: &mut Image, text: &str, [x0, y0]: [usize; 2], unit: usize) {
             for bit in (0..GLYPH).filter(|bit| bits >> bit & 1 == 1) {
                 for y in 0..unit {
                     let start = (y0 + row * unit + y) * width + x0 + (column * GLYPH + bit) * unit;
-                    image.pixels[start..start + unit].fill(INK);
+                    image.pixels[start..start + unit].fill(ink);
                 }
             }
         }
