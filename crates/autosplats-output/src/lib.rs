@@ -1,4 +1,5 @@
-//! Pictures as PNG or JPEG, their layers as OpenEXR, and successive pictures as numbered files or as a film made by ffmpeg.
+//! Pictures as PNG or JPEG, their layers as OpenEXR, and successive pictures as numbered files or as a film made by
+//! ffmpeg.
 //!
 //! ```no_run
 //! use autosplats_output::{Film, Target};

@@ -57,7 +57,8 @@ pub struct Frames {
 
 impl Target {
     /// Parses a path. The extensions `.mp4`, `.mkv`, `.webm` and `.mov` mean a film, those of a [`PictureFormat`]
-    /// numbered pictures. The number replaces `%d`, `%05d` or the like, or else is appended to the name with at least five digits.
+    /// numbered pictures. The number replaces `%d`, `%05d` or the like, or else is appended to the name with at least
+    /// five digits.
     ///
     /// # Errors
     /// [`Error::Name`] if the extension is another one or the name has several numbers.

@@ -288,11 +288,6 @@ impl Source {
     }
 }
 
-/// A frame without points if a filter keeps none of them, since an object may leave the scene.
-pub(crate) fn or_empty(frame: Result<PointCloud, Error>) -> Result<PointCloud, Error> {
-    if matches!(frame, Err(Error::NothingKept { .. })) { Ok(PointCloud::default()) } else { frame }
-}
-
 /// Whether a file is called like a glTF, which may be animated.
 pub(crate) fn is_gltf(path: &Path) -> bool {
     path.extension().is_some_and(|end| end.eq_ignore_ascii_case("glb") || end.eq_ignore_ascii_case("gltf"))

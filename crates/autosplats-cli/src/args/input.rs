@@ -64,8 +64,8 @@ pub(crate) struct PlayingArgs {
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct ReadingArgs {
-    /// Column names of text and headerless binary files, such as x,y,z,Intensity,red,green,blue; '-' skips a column, '...'
-    /// at the end all others of a text [default: from the header, else guessed, with a note]
+    /// Column names of text and headerless binary files, such as x,y,z,Intensity,red,green,blue; '-' skips a column,
+    /// '...' at the end all others of a text [default: from the header, else guessed, with a note]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) columns: Option<Vec<String>>,
     /// Intrinsics of depth images in pixels, and SCALE, pixel values per metre; without it, whole numbers are
@@ -74,8 +74,8 @@ pub(crate) struct ReadingArgs {
     #[arg(long, value_name = "FX,FY,CX,CY[,SCALE]", value_parser = values::depth_camera, allow_hyphen_values = true)]
     pub(crate) depth_camera: Option<DepthCamera>,
     /// Points to keep, by class, flag and return, such as ground,building or 2..6,first. A hyphen leaves out:
-    /// -noise,-withheld. One word without a hyphen has to match for classes, one for flags, one for returns. 'all' keeps
-    /// all, 'usual' all but noise (classes 7 and 18) and withheld points [default: all, but usual for pictures]
+    /// -noise,-withheld. One word without a hyphen has to match for classes, one for flags, one for returns. 'all'
+    /// keeps all, 'usual' all but noise (classes 7 and 18) and withheld points [default: all, but usual for pictures]
     #[arg(long, value_name = "WORDS", allow_hyphen_values = true)]
     pub(crate) keep: Option<PointFilter>,
     /// Keep points at (0, 0, 0), the sensor itself, which scanners write for missing returns

@@ -168,8 +168,8 @@ fn load(path: &Path, console: &Console) -> Result<Camera, Failure> {
     Ok(camera)
 }
 
-/// Most that a principal point may lie beside the middle, as a part of the picture's width or height, and that pixels may
-/// differ from squares, without a note.
+/// Most that a principal point may lie beside the middle, as a part of the picture's width or height, and that pixels
+/// may differ from squares, without a note.
 const MAX_ASYMMETRY: f64 = 0.01;
 
 /// The view of a calibrated camera, whose field of view is kept from top to bottom.

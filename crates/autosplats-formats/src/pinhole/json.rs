@@ -5,7 +5,8 @@ use serde_json::Value;
 
 use super::{PinholeCamera, scale_of};
 
-/// Parses an object. Open3D's classes are an intrinsic, parameters with an `intrinsic`, or a trajectory of `parameters`.
+/// Parses an object. Open3D's classes are an intrinsic, parameters with an `intrinsic`, or a trajectory of
+/// `parameters`.
 pub(super) fn parse(text: &str) -> Option<PinholeCamera> {
     let file: Value = serde_json::from_str(text).ok()?;
     let trajectory = file.get("parameters").and_then(Value::as_array);
@@ -53,8 +54,8 @@ fn flat(list: &Value) -> Option<Vec<f64>> {
     Some(numbers)
 }
 
-/// The pose of an extrinsic, the 4 × 4 matrix from world to camera. It goes column by column as Open3D writes it, or row
-/// by row: the row 0 0 0 1 tells. With neither or both, it is no pose or goes column by column.
+/// The pose of an extrinsic, the 4 × 4 matrix from world to camera. It goes column by column as Open3D writes it, or
+/// row by row: the row 0 0 0 1 tells. With neither or both, it is no pose or goes column by column.
 fn pose(matrix: &[f64]) -> Option<DMat4> {
     let matrix: &[f64; 16] = matrix.try_into().ok()?;
     let columns = DMat4::from_cols_array(matrix);

@@ -10,7 +10,6 @@ pub use super::columns::{MAX_COLUMNS, numbered};
 use super::{
     Attribute, Job, ReadOptions,
     columns::{AGAIN, field_name, find_axes, find_color, is_longitude},
-    text::is_packed_color,
     units::{LOOKS_LIKE_DEGREES, look_like_degrees},
 };
 use crate::color_scale::ColorScale;
@@ -136,6 +135,11 @@ pub struct Table<'a> {
     pub packed_rgb: bool,
     /// Fraction of the whole work that is finished before this table is read.
     pub done: f32,
+}
+
+/// Whether a value is a colour packed into 32 bits.
+pub(super) fn is_packed_color(name: &str, scalar: Scalar) -> bool {
+    scalar.size() == 4 && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase())
 }
 
 impl Table<'_> {

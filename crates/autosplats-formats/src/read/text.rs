@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::{
     Job,
     columns::{is_latitude, is_longitude},
-    table::{CHUNK, ProgressRange, Scalar, reserve},
+    table::{CHUNK, ProgressRange, Scalar, is_packed_color, reserve},
 };
 
 /// Bytes of text that one thread parses at a time.
@@ -302,11 +302,6 @@ pub(super) fn number(value: &[u8]) -> Result<f64, String> {
 /// The values of a line, separated by blanks, commas or semicolons.
 pub(super) fn values(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|byte| matches!(byte, b' ' | b'\t' | b',' | b';' | b'\r')).filter(|value| !value.is_empty())
-}
-
-/// Whether a value is a colour packed into 32 bits.
-pub(super) fn is_packed_color(name: &str, scalar: Scalar) -> bool {
-    scalar.size() == 4 && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase())
 }
 
 /// A line without the blanks around it, and without a byte order mark.

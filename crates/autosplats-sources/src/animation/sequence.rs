@@ -14,7 +14,7 @@ use super::frames::Frames;
 use crate::{
     Timeline,
     listing::{candidates, is_named_as_cloud},
-    source::or_empty,
+    stream::or_empty,
 };
 
 /// Files, one per frame.

@@ -16,7 +16,7 @@ use super::{
     mailbox::Mailbox,
     work::{LiveOptions, UntilAbandoned, guarded, now},
 };
-use crate::{Update, source::or_empty};
+use crate::{Update, stream::or_empty};
 
 /// Bytes read at a time.
 const READ_BYTES: usize = 1 << 16;

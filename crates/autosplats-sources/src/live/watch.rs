@@ -20,7 +20,7 @@ use super::{
 use crate::{
     Update,
     listing::{is_named_as_cloud, natural},
-    source::or_empty,
+    stream::or_empty,
 };
 
 /// Time between two polls. A file that is the same in two consecutive polls counts as complete.

@@ -6,8 +6,8 @@ use crate::Error;
 
 /// What to show where no surface is. Colours are sRGB, 8 bits a channel.
 ///
-/// Text is parsed as a colour, as two for a gradient, or as `transparent`. A colour is one of CSS by its name, `#rrggbb`
-/// or `#rgb`.
+/// Text is parsed as a colour, as two for a gradient, or as `transparent`. A colour is one of CSS by its name,
+/// `#rrggbb` or `#rgb`.
 ///
 /// # Examples
 ///

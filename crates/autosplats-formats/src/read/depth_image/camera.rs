@@ -73,8 +73,8 @@ impl Camera {
     }
 }
 
-/// Names of files that hold the camera of this image alone, by its own name. Open3D's window captures `DepthCapture_T.png`
-/// and `DepthCamera_T.json`.
+/// Names of files that hold the camera of this image alone, by its own name. Open3D's window captures
+/// `DepthCapture_T.png` and `DepthCamera_T.json`.
 fn own_files(path: &Path) -> Vec<PathBuf> {
     let Some(stem) = path.file_stem().and_then(|stem| stem.to_str()) else { return Vec::new() };
     let mut stems = vec![stem.to_owned()];

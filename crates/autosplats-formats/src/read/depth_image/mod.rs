@@ -3,8 +3,8 @@
 //! # How it works
 //!
 //! The camera is given by the caller, by a file beside the image, or else guessed. A picture of the same size, whose
-//! name has `color` instead of `depth`, gives the colours. Pixels without depth make no points. 16-bit values whose bytes
-//! are swapped are told by the roughness that this makes.
+//! name has `color` instead of `depth`, gives the colours. Pixels without depth make no points. 16-bit values whose
+//! bytes are swapped are told by the roughness that this makes.
 
 mod camera;
 pub(super) mod color;

@@ -74,8 +74,8 @@ const MAX_PAIRS: usize = 1 << 17;
 /// Fewest pairs of different neighbours that show the byte order.
 const MIN_PAIRS: usize = 64;
 
-/// Whether values are far smoother with their bytes swapped. Steps between neighbours are small; in the wrong order they
-/// are multiples of 256, more or less.
+/// Whether values are far smoother with their bytes swapped. Steps between neighbours are small; in the wrong order
+/// they are multiples of 256, more or less.
 ///
 /// Depths of which only the high byte varies are smooth in either order, and stay as they are.
 fn is_swapped(values: &[u16], width: usize) -> bool {

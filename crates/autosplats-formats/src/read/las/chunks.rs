@@ -2,9 +2,9 @@
 //!
 //! # How it works
 //!
-//! A table behind the points states the length of each chunk. If there is no table, or it cannot be true, the chunks are
-//! found one after the other. A chunk in layers states its number of points and its length. Any other chunk has a fixed
-//! number of points, and ends where decompressing these ends.
+//! A table behind the points states the length of each chunk. If there is no table, or it cannot be true, the chunks
+//! are found one after the other. A chunk in layers states its number of points and its length. Any other chunk has a
+//! fixed number of points, and ends where decompressing these ends.
 
 use std::{io::Cursor, ops::Range};
 
@@ -12,8 +12,8 @@ use laz::{LazItem, LazItemType, LazVlr, laszip::ChunkTable};
 
 use super::super::Job;
 use super::{
+    decompressor::{decompressor, layered},
     header::Header,
-    laz::{decompressor, layered},
     point14,
 };
 

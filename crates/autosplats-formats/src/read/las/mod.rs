@@ -12,6 +12,7 @@
 mod chunks;
 mod columns;
 mod coordinates;
+mod decompressor;
 mod describe;
 mod dimension;
 mod extra;

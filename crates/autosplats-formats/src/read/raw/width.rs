@@ -29,8 +29,8 @@ const NAN_DIFFERENCE: f64 = 0.5;
 const CLEAR_SHARE: f64 = 0.03;
 const CLEAR_NOISE: f64 = 1.2;
 
-/// Mean difference in rank of two columns, smallest with smallest to largest with largest, from which on they hold other
-/// values; and the same in units of 1/√n for n values.
+/// Mean difference in rank of two columns, smallest with smallest to largest with largest, from which on they hold
+/// other values; and the same in units of 1/√n for n values.
 const OTHER_VALUES: f32 = 0.04;
 const OTHER_NOISE: f32 = 0.5;
 
@@ -113,8 +113,8 @@ fn difference(runs: &[Vec<f32>], width: usize) -> f64 {
     sum / pairs().count().max(1) as f64
 }
 
-/// Whether every other point of `width` numbers has values like the others, in all columns but one: two lasers may stand
-/// at different angles.
+/// Whether every other point of `width` numbers has values like the others, in all columns but one: two lasers may
+/// stand at different angles.
 fn same_values(runs: &[Vec<f32>], width: usize) -> bool {
     let differ = |column: &usize| {
         let sorted = |first: usize| {

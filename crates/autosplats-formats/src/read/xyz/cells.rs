@@ -1,7 +1,7 @@
 //! The values of a line, and the separators between them.
 
 use super::super::{columns::MAX_COLUMNS, text};
-use super::numbers::Notation;
+use super::numbers::{Notation, unquoted};
 
 /// Separator between values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,15 +63,6 @@ impl Dialect {
         let mut last = &b" "[..];
         let count = self.cells(line).take(MAX_COLUMNS + 1).inspect(|cell| last = cell).count();
         (count, count - usize::from(last.is_empty()))
-    }
-}
-
-/// A cell without the blanks and quotes around it.
-pub(super) fn unquoted(cell: &[u8]) -> &[u8] {
-    let cell = cell.trim_ascii();
-    match cell {
-        [b'"', inner @ .., b'"'] => inner.trim_ascii(),
-        _ => cell,
     }
 }
 

@@ -1,8 +1,9 @@
 //! Detection of the separator and of the notation of numbers from the first rows.
 
 use super::super::{columns::MAX_COLUMNS, text};
-use super::cells::{Dialect, Separator, is_missing, unquoted};
+use super::cells::{Dialect, Separator, is_missing};
 use super::numbers::Notation;
+use super::numbers::unquoted;
 
 /// Rows that the dialect is taken from.
 const ROWS: usize = 200;

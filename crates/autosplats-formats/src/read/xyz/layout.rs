@@ -1,6 +1,6 @@
 //! The meaning and notation of the values of a row.
 
-use autosplats_cloud::{Crs, Error, Unit, excerpt};
+use autosplats_cloud::{Crs, Error, excerpt};
 
 use super::super::{Job, columns, columns::MAX_COLUMNS, text};
 use super::cells::{Dialect, is_comment, is_count, is_missing, trimmed};
@@ -170,14 +170,4 @@ fn cells(dialect: &Dialect, lines: &[&[u8]], widths: Widths) -> Vec<Vec<Cell>> {
         rows.retain(|row| numbers(row) >= 3);
     }
     rows
-}
-
-/// The units of positions, from the names and units of their columns. Words for longitude and latitude also mean the
-/// length and width of things, so the values have to be angles.
-pub(super) fn crs(names: &[String], units: &[Option<Unit>], [x, y, z]: [usize; 3], rows: &[Vec<Cell>]) -> Crs {
-    let unit = |index: usize| units.get(index).copied().flatten();
-    let within = |column: usize, limit: f64| rows.iter().all(|row| !(row[column].number().abs() > limit));
-    let degrees = columns::is_longitude(&names[x]) && within(x, 360.0) && within(y, 90.0);
-    let horizontal = if degrees { Some(Unit::Degree) } else { unit(x) };
-    Crs { unit: horizontal, vertical_unit: unit(z).filter(|_| unit(z) != horizontal), ..Crs::default() }
 }

@@ -1,13 +1,12 @@
 //! Names of the columns: from a header, or guessed.
 
-use autosplats_cloud::{Crs, excerpt};
+use autosplats_cloud::{Crs, Unit, excerpt};
 
 use super::super::{Job, columns};
 use super::cells::Dialect;
 use super::dialect::Widths;
 use super::guess::{Cell, counts, guessed, words};
 use super::header::Header;
-use super::layout::crs;
 
 /// Rows required to take a first column for point numbers; fewer coordinates may rise evenly by chance.
 const MIN_COUNTED_ROWS: usize = 8;
@@ -225,4 +224,14 @@ fn filled(names: &[String]) -> Vec<String> {
         if name.is_empty() { format!("column_{}", index + 1) } else { name.clone() }
     };
     names.iter().enumerate().map(name).collect()
+}
+
+/// The units of positions, from the names and units of their columns. Words for longitude and latitude also mean the
+/// length and width of things, so the values have to be angles.
+fn crs(names: &[String], units: &[Option<Unit>], [x, y, z]: [usize; 3], rows: &[Vec<Cell>]) -> Crs {
+    let unit = |index: usize| units.get(index).copied().flatten();
+    let within = |column: usize, limit: f64| rows.iter().all(|row| !(row[column].number().abs() > limit));
+    let degrees = columns::is_longitude(&names[x]) && within(x, 360.0) && within(y, 90.0);
+    let horizontal = if degrees { Some(Unit::Degree) } else { unit(x) };
+    Crs { unit: horizontal, vertical_unit: unit(z).filter(|_| unit(z) != horizontal), ..Crs::default() }
 }

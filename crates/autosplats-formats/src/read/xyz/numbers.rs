@@ -6,10 +6,18 @@
 use autosplats_cloud::excerpt;
 
 use super::super::text;
-use super::cells::unquoted;
 
 /// Longest number in bytes.
 const MAX_LEN: usize = 64;
+
+/// A cell without the blanks and quotes around it.
+pub(super) fn unquoted(cell: &[u8]) -> &[u8] {
+    let cell = cell.trim_ascii();
+    match cell {
+        [b'"', inner @ .., b'"'] => inner.trim_ascii(),
+        _ => cell,
+    }
+}
 
 /// What separates groups of three digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
