@@ -58,7 +58,7 @@ fn frames_are_chosen_and_numbered_as_they_are() {
 fn frames_of_few_points_have_fewer_neighbours() {
     let folder = folder();
     folder.write("sweep/scan_4.xyz", "0 0 0\n9 0 0\n0 9 0\n9 9 0");
-    let out = folder.succeed(&["render", "sweep", "--size", "120x90", "-k", "10", "-o", "f.png"]);
+    let out = folder.succeed(&["render", "sweep", "--size", "120x90", "-k", "10", "-o", "f_%d.png"]);
     let told: Vec<_> = out.stderr.lines().filter(|line| line.contains("neighbours")).collect();
     assert!(told.len() == 1 && told[0].contains("4 points cannot have 10 neighbours each; using 3"), "{told:?}");
 }
