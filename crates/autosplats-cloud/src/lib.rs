@@ -35,7 +35,7 @@ mod thin;
 pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
-pub use error::{Error, excerpt, one_line};
+pub use error::{Error, excerpt, one_line, printable, shown_number};
 pub use error_kind::ErrorKind;
 pub use files::{Bytes, temporary_beside, write_whole};
 pub use geographic::{LocalMetres, looks_like_degrees};

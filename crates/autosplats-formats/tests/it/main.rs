@@ -4,10 +4,12 @@
 
 mod common;
 mod e57;
+mod e57_faults;
 mod formats;
 mod gltf;
 mod hostile;
 mod las;
+mod las_faults;
 mod las_writing;
 mod losses;
 mod meshes;
@@ -16,3 +18,4 @@ mod ptx;
 mod real_files;
 mod sensors;
 mod text;
+mod units;
