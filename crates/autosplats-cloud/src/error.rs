@@ -197,6 +197,23 @@ pub fn one_line(text: &str) -> String {
 
 /// A piece of a file for a message: at most 40 bytes, without characters that act on a terminal.
 pub fn excerpt(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(40)]);
-    text.chars().flat_map(char::escape_debug).collect()
+    printable(&String::from_utf8_lossy(&bytes[..bytes.len().min(40)]))
+}
+
+/// Text of a file for a message: characters that act on a terminal or cannot be seen are escaped, quotes are not.
+pub fn printable(text: &str) -> String {
+    let mut printable = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\'' | '"' => printable.push(c),
+            _ => printable.extend(c.escape_debug()),
+        }
+    }
+    printable
+}
+
+/// A number for a message, with at most a dozen digits before or behind the point.
+pub fn shown_number(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-9..1e12).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
 }

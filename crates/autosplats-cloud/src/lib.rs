@@ -43,7 +43,7 @@ pub use cloud::{Field, FieldValues, PointCloud, Scan};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use encoding::{Unmarked, read_text};
-pub use error::{Error, excerpt, one_line};
+pub use error::{Error, excerpt, one_line, printable, shown_number};
 pub use error_kind::ErrorKind;
 pub use files::{Bytes, temporary_beside, write_whole};
 pub use filter::{LeftOut, PointFilter};

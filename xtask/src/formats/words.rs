@@ -17,6 +17,8 @@ All readers:
   `convert` also reads what the floats round off, and so writes all digits.
 - Attributes keep their bit width. Their names are PDAL's if PDAL has one (`Intensity`, `Classification`, `ReturnNumber`,
   `GpsTime`, `NormalX` …), else the file's.
+- Heights in another unit of length than x and y are scaled to that unit. Longitude and latitude stay in degrees;
+  pictures, normals and written E57 have metres on the ground.
 - Points at exactly (0, 0, 0), which scanners write for missing returns, are dropped and counted. Points without a
   finite position are kept in the cloud and left out of pictures.
 - `--keep` chooses points by class, flag and return. Pictures leave out noise (classes 7 and 18) and withheld points;
@@ -42,7 +44,7 @@ pub(super) const FORMAT_TEXTS: &[FormatText] = &[
     FormatText {
         name: "LAS",
         kept: "LAS 1.0 to 1.4, LAZ and COPC, point formats 0 to 10: coordinates, colours, all attributes, extra bytes, units \
-               and coordinate system, scale as resolution",
+               and coordinate system, scale as resolution; records that a count of zero denies, chunks that no table lists",
         not_kept: "waveforms; the COPC octree, as all points are read",
     },
     FormatText {

@@ -170,8 +170,9 @@ impl Table<'_> {
         let xyz = self.take(axes);
         let world = |i| DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, i)));
         let fine = xyz[..2].iter().all(|column| column.scalar == Scalar::F64);
-        let guessed = guess && fine && job.options.columns.is_none() && look_like_degrees(self.count, world);
-        let degrees = guessed || is_longitude(&names[axes[0]]);
+        let named = is_longitude(&names[axes[0]]);
+        let guessed = guess && !named && fine && job.options.columns.is_none() && look_like_degrees(self.count, world);
+        let degrees = named || guessed;
         let origin = if degrees { degree_origin(self.count, world) } else { storage_origin(self.count, world) };
         let exact = if job.options.exact { 12 } else { 0 };
         let fields: usize = self.columns.iter().map(|column| column.scalar.size()).sum();

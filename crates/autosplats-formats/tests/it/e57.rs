@@ -137,7 +137,7 @@ fn fields_of_every_type_come_back() {
 }
 
 /// Two scans with poses, and points of no scan before, between and after them.
-fn posed() -> PointCloud {
+pub(crate) fn posed() -> PointCloud {
     let mut random = Random::from_state(7);
     let positions: Vec<[f32; 3]> =
         (0..100).map(|_| [random.unit() as f32 * 50.0, random.unit() as f32 * 50.0, random.unit() as f32]).collect();
@@ -316,7 +316,7 @@ fn coordinates_are_written_in_metres() {
 }
 
 /// Writes a cloud to bytes.
-fn written(cloud: &PointCloud) -> Vec<u8> {
+pub(crate) fn written(cloud: &PointCloud) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.e57");
     write(cloud, &path, &()).unwrap();
@@ -324,7 +324,7 @@ fn written(cloud: &PointCloud) -> Vec<u8> {
 }
 
 /// CRC-32C bit by bit, independent of the code under test.
-fn checksum(data: &[u8]) -> [u8; 4] {
+pub(crate) fn checksum(data: &[u8]) -> [u8; 4] {
     let step = |crc: u32| if crc & 1 == 1 { crc >> 1 ^ 0x82f6_3b78 } else { crc >> 1 };
     let crc = data.iter().fold(u32::MAX, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| step(crc)));
     (!crc).to_be_bytes()
@@ -340,7 +340,7 @@ fn changed(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
     data.chunks(1020).flat_map(|page| [page, &checksum(page)].concat()).collect()
 }
 
-fn message(bytes: &[u8]) -> String {
+pub(crate) fn message(bytes: &[u8]) -> String {
     let result = read_bytes(Path::new("a.e57"), bytes, &ReadOptions::default(), &());
     let message = result.map(|cloud| cloud.len()).unwrap_err().to_string();
     assert!(!message.contains(char::is_control), "one line: {message:?}");
@@ -438,7 +438,7 @@ fn changes_that_checksums_do_not_tell() {
 }
 
 /// A file with this XML section after `data`.
-fn file(data: &[u8], xml: &str) -> Vec<u8> {
+pub(crate) fn file(data: &[u8], xml: &str) -> Vec<u8> {
     let mut all = b"ASTM-E57".to_vec();
     let len = (48 + data.len() + xml.len()).div_ceil(1020) as u64 * 1024;
     let start = (48 + data.len()) as u64;

@@ -241,19 +241,20 @@ fn keys_say_what_text_of_a_horizontal_system_does_not() {
         keys.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>()
     };
     let (heights, x_and_y) = ([4099, 0, 1, 9001], [3076, 0, 1, 9001]);
-    let metre = Some(Unit::Metre);
     let cases = [
-        (&*horizontal, vec![heights], Some(Unit::Foot), metre),
-        (&horizontal, vec![x_and_y, heights], Some(Unit::Foot), metre),
-        (&horizontal, vec![x_and_y], Some(Unit::Foot), None),
-        (&both, vec![heights], Some(Unit::Foot), None),
-        (&centre, vec![[4099, 0, 1, 9002]], metre, None),
-        (r#"PROJCS["p"]"#, vec![[3076, 0, 1, 9002], heights], Some(Unit::Foot), metre),
+        (&*horizontal, vec![heights], Unit::Foot, true),
+        (&horizontal, vec![x_and_y, heights], Unit::Foot, true),
+        (&horizontal, vec![x_and_y], Unit::Foot, false),
+        (&both, vec![heights], Unit::Foot, false),
+        (&centre, vec![[4099, 0, 1, 9002]], Unit::Metre, false),
+        (r#"PROJCS["p"]"#, vec![[3076, 0, 1, 9002], heights], Unit::Foot, true),
     ];
-    for (text, units, unit, vertical) in cases {
+    for (text, units, unit, in_metres) in cases {
         let vlrs = [("LASF_Projection", 2112, text.as_bytes().to_vec()), ("LASF_Projection", 34735, keys(&units))];
-        let (cloud, _) = load(&file(2, 0, &vlrs, &[vec![1; 20], vec![2; 20]]));
-        assert_eq!((cloud.crs().unit, cloud.crs().vertical_unit), (unit, vertical), "{text}, {units:?}");
+        let (cloud, notes) = load(&file(2, 0, &vlrs, &[vec![1; 20], vec![2; 20]]));
+        assert_eq!((cloud.crs().unit, cloud.crs().vertical_unit), (Some(unit), None), "{text}, {units:?}");
+        let scaled = notes.iter().any(|note| note.contains("heights in metre; heights are scaled to foot"));
+        assert_eq!(scaled, in_metres, "{text}, {units:?}: {notes:?}");
         let back = load(&written(&cloud, "a.las").0).0;
         assert_eq!(back.crs(), cloud.crs(), "{text}, {units:?}: and comes back");
     }

@@ -2,6 +2,7 @@
 
 use std::io::Cursor;
 
+use autosplats_cloud::printable;
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 
 /// Largest number of bytes that one compressed byte of a PNG can expand to.
@@ -16,5 +17,5 @@ pub(super) fn decode(bytes: &[u8], format: ImageFormat, width: usize, height: us
     limits.max_alloc = Some((width as u64 * height as u64).saturating_mul(16).saturating_add(1 << 24));
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);
-    reader.decode().map_err(|error| error.to_string().chars().flat_map(char::escape_debug).collect())
+    reader.decode().map_err(|error| printable(&error.to_string()))
 }

@@ -1,6 +1,6 @@
 //! Describes a file by its XML section, without reading the points.
 
-use autosplats_cloud::{Error, Scan, excerpt};
+use autosplats_cloud::{Error, Scan, excerpt, printable};
 use glam::{DMat4, DVec3};
 
 use super::super::{Attribute, Description, Job};
@@ -34,6 +34,9 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     });
     let scans = scans.collect();
     let mut notes = root.notes.clone();
+    notes.extend(root.faults.iter().map(|(scan, what)| format!("{scan} is left out: {what}")));
+    let poses = root.scans.iter().filter_map(|scan| Some(format!("{}: {}", scan.shown(), scan.pose_note.as_ref()?)));
+    notes.extend(poses);
     if pages.cut_off() {
         notes.push(format!("the file is cut off at byte {}", job.bytes.len()));
     }
@@ -62,7 +65,7 @@ fn details(root: &Root) -> Vec<(String, String)> {
         let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
         add("images", Some(format!("{}{names}; not read", root.images.len())));
     }
-    for (index, scan) in root.scans.iter().enumerate().take(MAX_DESCRIBED_SCANS) {
+    for scan in root.scans.iter().take(MAX_DESCRIBED_SCANS) {
         let mut facts = vec![format!("{} points", scan.points)];
         if let Some([row, column]) = scan.indices {
             facts.push(format!("rows {} to {}, columns {} to {}", row[0], row[1], column[0], column[1]));
@@ -71,7 +74,7 @@ fn details(root: &Root) -> Vec<(String, String)> {
         facts.extend(scan.sensor.as_deref().map(shown_text));
         facts.extend(scan.start.map(|start| format!("begun {}", date(start))));
         facts.extend(scan.description.as_deref().map(shown_text));
-        add(&scan.shown(index), Some(facts.join("; ")));
+        add(&scan.shown(), Some(facts.join("; ")));
     }
     details
 }
@@ -114,11 +117,7 @@ fn date(seconds: f64) -> String {
 /// Text of the file in one line, without characters that act on a terminal.
 fn shown_text(text: &str) -> String {
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    if line.len() > 40 {
-        line.chars().take(200).flat_map(char::escape_debug).collect()
-    } else {
-        excerpt(line.as_bytes())
-    }
+    if line.len() > 40 { printable(&line.chars().take(200).collect::<String>()) } else { excerpt(line.as_bytes()) }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The bit-packed values of a point in an E57 file.
 
-use autosplats_cloud::FieldValues;
+use autosplats_cloud::{FieldValues, shown_number};
 
 /// One value of each point.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,10 +65,12 @@ impl Stored {
             Self::Integer { min, .. } if self.bits() == 0 => format!("constant {min}"),
             Self::Integer { .. } => format!("int {} bit", self.bits()),
             Self::Scaled { min, scale, offset, .. } if self.bits() == 0 => {
-                format!("constant {}", min as f64 * scale + offset)
+                format!("constant {}", shown_number(min as f64 * scale + offset))
             }
-            Self::Scaled { scale, offset: 0.0, .. } => format!("int {} bit × {scale}", self.bits()),
-            Self::Scaled { scale, offset, .. } => format!("int {} bit × {scale} + {offset}", self.bits()),
+            Self::Scaled { scale, offset: 0.0, .. } => format!("int {} bit × {}", self.bits(), shown_number(scale)),
+            Self::Scaled { scale, offset, .. } => {
+                format!("int {} bit × {} + {}", self.bits(), shown_number(scale), shown_number(offset))
+            }
             Self::Text => "text".into(),
         }
     }

@@ -13,6 +13,7 @@ mod describe;
 mod element;
 mod packets;
 mod pages;
+mod repair;
 mod source;
 mod xml;
 
@@ -53,20 +54,22 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let mut done = 0.0;
     let mut sources: Vec<Source<'_>> = Vec::new();
     let mut dropped = Dropped::default();
-    let (mut faults, mut told) = (Vec::new(), Vec::new());
-    for (index, header) in root.scans.iter().enumerate() {
+    let in_xml = |(scan, what): &(String, String)| (scan.clone(), "XML section".to_owned(), what.clone());
+    let mut faults: Vec<_> = root.faults.iter().map(in_xml).collect();
+    let mut told = Vec::new();
+    for header in &root.scans {
         let share = GATHERING / root.scans.len() as f32;
         let source = source(job, &pages, header, (&mut left, &mut dropped), done..done + share);
         done += share;
         match source {
             Ok(source) => {
-                told.extend(losses(header, &source).map(|what| format!("{}: {what}", header.shown(index))));
+                told.extend(losses(header, &source).map(|what| format!("{}: {what}", header.shown())));
                 if job.progress.wants_chunks() {
                     cloud::preview(job, &source)?;
                 }
                 sources.push(source);
             }
-            Err(Error::Malformed { place, what, .. }) => faults.push((header.shown(index), place, what)),
+            Err(Error::Malformed { place, what, .. }) => faults.push((header.shown(), place, what)),
             Err(other) => return Err(other),
         }
     }
@@ -105,5 +108,5 @@ fn losses(header: &ScanHeader, source: &Source<'_>) -> impl Iterator<Item = Stri
     let (count, points) = (source.values.count, header.points);
     let cut = ((count as u64) < points).then(|| format!("the data end after {count} of {points} points"));
     let text = header.elements.iter().any(|element| element.stored == element::Stored::Text);
-    cut.into_iter().chain(text.then(|| "values that are text are left out".into()))
+    header.pose_note.clone().into_iter().chain(cut).chain(text.then(|| "values that are text are left out".into()))
 }

@@ -55,9 +55,10 @@ impl<'a> Pages<'a> {
         Ok(Self { bytes, size: size as usize, version, xml: (u64_at(24), u64_at(32)), claimed: u64_at(16) })
     }
 
-    /// Bytes of data in all complete pages.
+    /// Bytes of data in all pages, and in what is there of a last page that is cut off.
     pub(super) fn len(&self) -> usize {
-        self.bytes.len() / self.size * (self.size - CHECKSUM)
+        let data = self.size - CHECKSUM;
+        self.bytes.len() / self.size * data + (self.bytes.len() % self.size).min(data)
     }
 
     /// Whether the file is shorter than its header states.
@@ -67,9 +68,9 @@ impl<'a> Pages<'a> {
 
     /// Converts a physical address from the file to a logical one; fails if there is no data at it.
     pub(super) fn logical(&self, job: &Job<'_>, what: &str, physical: u64) -> Result<usize, Error> {
-        let fail = |why: String| Err(job.malformed(format!("byte {}", self.bytes.len()), why));
-        if physical >= (self.bytes.len() / self.size * self.size) as u64 {
-            return fail(format!("the file ends before {what} at byte {physical}; it is cut off, copy it again"));
+        if physical >= self.bytes.len() as u64 {
+            let why = format!("the file ends before {what} at byte {physical}; it is cut off, copy it again");
+            return Err(job.malformed(format!("byte {}", self.bytes.len()), why));
         }
         let (page, within) = (physical as usize / self.size, physical as usize % self.size);
         if within >= self.size - CHECKSUM {
@@ -97,7 +98,7 @@ impl<'a> Pages<'a> {
         }
     }
 
-    /// Verifies the checksums of all pages that overlap a logical range.
+    /// Verifies the checksums of all pages that overlap a logical range. A page that is cut off has none.
     pub(super) fn check(&self, job: &Job<'_>, range: Range<usize>) -> Result<(), Error> {
         let data = self.size - CHECKSUM;
         let pages = range.start / data..range.end.div_ceil(data).min(self.bytes.len() / self.size);
@@ -119,21 +120,21 @@ impl<'a> Pages<'a> {
         Ok(())
     }
 
-    /// The bytes of the XML section.
-    pub(super) fn xml(&self, job: &Job<'_>) -> Result<Vec<u8>, Error> {
+    /// The bytes of the XML section that are there, and the error if some are not.
+    pub(super) fn xml(&self, job: &Job<'_>) -> Result<(Vec<u8>, Option<Error>), Error> {
         let start = self.logical(job, "the XML section", self.xml.0)?;
-        let len = usize::try_from(self.xml.1).unwrap_or(usize::MAX);
-        if len > self.len() - start {
-            return Err(job.malformed(
-                format!("byte {}", self.bytes.len()),
-                format!("the file ends inside the {len} bytes of its XML section; it is cut off, copy it again"),
-            ));
-        }
+        let wanted = usize::try_from(self.xml.1).unwrap_or(usize::MAX);
+        let len = wanted.min(self.len() - start);
+        let cut = (len < wanted).then(|| {
+            let what =
+                format!("the file ends inside the {wanted} bytes of its XML section; it is cut off, copy it again");
+            job.malformed(format!("byte {}", self.bytes.len()), what)
+        });
         self.check(job, start..start + len)?;
         let mut xml = Vec::new();
         reserve(&mut xml, len, "the XML section")?;
         xml.resize(len, 0);
         self.copy(start, &mut xml);
-        Ok(xml)
+        Ok((xml, cut))
     }
 }

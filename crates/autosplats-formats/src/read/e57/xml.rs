@@ -1,6 +1,6 @@
 //! The XML section: scans, their poses and the elements of their points.
 
-use autosplats_cloud::{Crs, Error, Unit, excerpt, guard};
+use autosplats_cloud::{Crs, Error, Unit, excerpt, guard, printable, shown_number};
 use glam::{DMat4, DQuat, DVec3};
 use roxmltree::{Document, Node, ParsingOptions};
 
@@ -8,6 +8,7 @@ use super::super::Job;
 use super::{
     element::{Element, Stored},
     pages::Pages,
+    repair::repaired,
 };
 
 /// Longest tag, in bytes: the parser compares all attributes of a tag with one another.
@@ -15,6 +16,9 @@ const MAX_TAG: usize = 1 << 13;
 
 /// Longest name of a coordinate system, in characters.
 const MAX_NAME: usize = 200;
+
+/// Largest difference of the length of a pose's quaternion from 1; the digits of `f32` lose far less.
+const MAX_LENGTH_ERROR: f64 = 1e-3;
 
 /// Most namespace declarations. More are an attack: the parser keeps nested ones at every level.
 const MAX_NAMESPACES: usize = 1 << 10;
@@ -27,6 +31,8 @@ pub(super) struct Root {
     pub(super) created: Option<f64>,
     pub(super) crs: Crs,
     pub(super) scans: Vec<ScanHeader>,
+    /// Scans that cannot be described, and why.
+    pub(super) faults: Vec<(String, String)>,
     /// Names of the images.
     pub(super) images: Vec<String>,
     pub(super) notes: Vec<String>,
@@ -41,6 +47,8 @@ impl Root {
 
 /// One scan, an entry of `data3D`.
 pub(super) struct ScanHeader {
+    /// Number in the file, counted from 1.
+    number: usize,
     pub(super) name: Option<String>,
     pub(super) description: Option<String>,
     /// Vendor, model and serial number.
@@ -48,6 +56,8 @@ pub(super) struct ScanHeader {
     /// Start of the time stamps, in seconds of GPS time.
     pub(super) start: Option<f64>,
     pub(super) pose: Option<DMat4>,
+    /// What is wrong with the pose.
+    pub(super) pose_note: Option<String>,
     /// Physical address of the points.
     pub(super) offset: u64,
     pub(super) points: u64,
@@ -72,12 +82,16 @@ impl ScanHeader {
         found.iter().all(Option::is_some).then(|| found.map(Option::unwrap_or_default))
     }
 
-    /// The scan's number, counted from 1, and name, for a message.
-    pub(super) fn shown(&self, index: usize) -> String {
-        match &self.name {
-            Some(name) => format!("scan {} '{}'", index + 1, excerpt(name.as_bytes())),
-            None => format!("scan {}", index + 1),
-        }
+    /// The scan's number and name, for a message.
+    pub(super) fn shown(&self) -> String {
+        shown(self.number, self.name.as_deref())
+    }
+}
+
+fn shown(number: usize, name: Option<&str>) -> String {
+    match name {
+        Some(name) => format!("scan {number} '{}'", excerpt(name.as_bytes())),
+        None => format!("scan {number}"),
     }
 }
 
@@ -91,14 +105,15 @@ impl Root {
         let text = text.trim_end_matches('\0');
         let fail = |what: String| job.malformed("XML section", what);
         check(text).map_err(fail)?;
-        let options = ParsingOptions {
-            // A node takes far more memory than its text.
-            nodes_limit: u32::try_from(text.len() / 8 + 1000).unwrap_or(u32::MAX),
-            ..ParsingOptions::default()
-        };
         guard(|| {
-            let document = Document::parse_with_options(text, options)
-                .map_err(|error| format!("{}; copy the file again", shown_long(&error.to_string())))?;
+            let fault = match Document::parse_with_options(text, options(text)) {
+                Ok(document) => return Self::of(&document, notes),
+                Err(error) => printable(&error.to_string().chars().take(MAX_NAME).collect::<String>()),
+            };
+            let repaired = repaired(text);
+            let document = Document::parse_with_options(&repaired, options(&repaired))
+                .map_err(|_| format!("{fault}; copy the file again"))?;
+            notes.push(format!("the XML section is not well formed ({fault}); what is clear of it is read"));
             Self::of(&document, notes)
         })
         .map_err(fail)
@@ -110,13 +125,19 @@ impl Root {
             return Err(format!("it begins with '{}', not with e57Root", excerpt(root.tag_name().name().as_bytes())));
         }
         let mut scans = Vec::new();
-        let mut empty = Vec::new();
+        let (mut empty, mut faults) = (Vec::new(), Vec::new());
         for (index, node) in children(root, "data3D").enumerate() {
             if child(node, "points").is_none() {
                 empty.push(index + 1);
                 continue;
             }
-            scans.push(scan(node).map_err(|what| format!("scan {}: {what}", index + 1))?);
+            match scan(node, index) {
+                Ok(scan) => scans.push(scan),
+                Err(what) => faults.push((shown(index + 1, text(node, "name").as_deref()), what)),
+            }
+        }
+        if let (true, Some((scan, what))) = (scans.is_empty(), faults.first()) {
+            return Err(format!("{scan}: {what}"));
         }
         match empty[..] {
             [] => {}
@@ -129,9 +150,18 @@ impl Root {
             created: time(root, "creationDateTime"),
             crs: crs(text(root, "coordinateMetadata").as_deref()),
             scans,
+            faults,
             images: children(root, "images2D").map(|node| text(node, "name").unwrap_or_default()).collect(),
             notes,
         })
+    }
+}
+
+/// Limits of the parser: a node takes far more memory than its text.
+fn options(text: &str) -> ParsingOptions<'_> {
+    ParsingOptions {
+        nodes_limit: u32::try_from(text.len() / 8 + 1000).unwrap_or(u32::MAX),
+        ..ParsingOptions::default()
     }
 }
 
@@ -165,7 +195,7 @@ fn check(text: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn scan(node: Node<'_, '_>) -> Result<ScanHeader, String> {
+fn scan(node: Node<'_, '_>, place: usize) -> Result<ScanHeader, String> {
     let points = child(node, "points").ok_or("no points")?;
     let attribute = |name: &str| {
         let value = points.attribute(name).ok_or_else(|| format!("its points have no {name}"))?;
@@ -196,12 +226,18 @@ fn scan(node: Node<'_, '_>) -> Result<ScanHeader, String> {
     };
     let index = |name| limits("indexBounds", name).map(|limits| limits.map(|value| value as i64));
     let range = child(node, "sphericalBounds").and_then(|bounds| number(child(bounds, "rangeMaximum")?));
+    let (pose, pose_note) = match pose(node) {
+        Ok((pose, note)) => (pose, note),
+        Err(what) => (None, Some(format!("its pose cannot be read ({what}); its points stay in the scanner's frame"))),
+    };
     Ok(ScanHeader {
+        number: place + 1,
         name: text(node, "name"),
         description: text(node, "description"),
         sensor: (!sensor.is_empty()).then_some(sensor),
         start: time(node, "acquisitionStart"),
-        pose: pose(node)?,
+        pose,
+        pose_note,
         offset: attribute("fileOffset")?,
         points: attribute("recordCount")?,
         elements,
@@ -252,21 +288,47 @@ fn element(node: Node<'_, '_>) -> Result<Element, String> {
     Ok(Element { name: name.into(), prefix: prefix.filter(|prefix| !own && !prefix.is_empty()), stored })
 }
 
-fn pose(node: Node<'_, '_>) -> Result<Option<DMat4>, String> {
-    let Some(pose) = child(node, "pose") else { return Ok(None) };
-    let values = |parent: &str, names: &[&str]| -> Vec<f64> {
-        let value = |name: &&str| child(pose, parent).and_then(|node| number(child(node, name)?)).unwrap_or(0.0);
-        names.iter().map(value).collect()
-    };
-    let rotation = values("rotation", &["x", "y", "z", "w"]);
-    let rotation = DQuat::from_xyzw(rotation[0], rotation[1], rotation[2], rotation[3]);
-    let translation = DVec3::from_slice(&values("translation", &["x", "y", "z"]));
-    if !rotation.is_finite() || !translation.is_finite() {
-        return Err("its pose is not finite".into());
+/// The pose of a scan, and what is odd about the pose.
+fn pose(node: Node<'_, '_>) -> Result<(Option<DMat4>, Option<String>), String> {
+    let Some(pose) = child(node, "pose") else { return Ok((None, None)) };
+    let rotation = components(pose, "rotation", ["x", "y", "z", "w"])?;
+    let translation = components(pose, "translation", ["x", "y", "z"])?;
+    let length = rotation.map(|rotation| DQuat::from_array(rotation).length());
+    let mut odd = Vec::new();
+    match length {
+        None => odd.push("it has no rotation".to_owned()),
+        Some(length) if length < 1e-9 => odd.push("its rotation is zero".to_owned()),
+        Some(length) if (length - 1.0).abs() > MAX_LENGTH_ERROR => {
+            odd.push(format!("its quaternion has length {}, not 1", shown_number(length)));
+        }
+        Some(_) => {}
     }
-    // A missing rotation is read as all zeros and means none.
-    let rotation = if rotation.length() > 1e-9 { rotation.normalize() } else { DQuat::IDENTITY };
-    Ok(Some(DMat4::from_rotation_translation(rotation, translation)))
+    if translation.is_none() {
+        odd.push("it has no translation".to_owned());
+    }
+    let rotation = rotation.map_or(DQuat::IDENTITY, DQuat::from_array);
+    let rotation = if rotation.length() < 1e-9 { DQuat::IDENTITY } else { rotation.normalize() };
+    let matrix = DMat4::from_rotation_translation(rotation, translation.map_or(DVec3::ZERO, DVec3::from_array));
+    let note = (!odd.is_empty()).then(|| format!("its pose is incomplete: {}", odd.join(", ")));
+    if matrix.is_finite() { Ok((Some(matrix), note)) } else { Err("its quaternion is too long".into()) }
+}
+
+/// The numbers of a part of a pose; `None` if the pose has no such part.
+fn components<const LEN: usize>(
+    pose: Node<'_, '_>,
+    part: &str,
+    names: [&str; LEN],
+) -> Result<Option<[f64; LEN]>, String> {
+    let Some(part_node) = child(pose, part) else { return Ok(None) };
+    let mut values = [0.0; LEN];
+    for (value, name) in values.iter_mut().zip(names) {
+        let node = child(part_node, name).ok_or_else(|| format!("its {part} has no {name}"))?;
+        *value = number(node).filter(|value| value.is_finite()).ok_or_else(|| {
+            let text = excerpt(node.text().unwrap_or_default().trim().as_bytes());
+            format!("'{text}' is no number, {name} of its {part}")
+        })?;
+    }
+    Ok(Some(values))
 }
 
 fn crs(metadata: Option<&str>) -> Crs {
@@ -318,15 +380,14 @@ fn time(node: Node<'_, '_>, name: &str) -> Option<f64> {
     number(child(child(node, name)?, "dateTimeValue")?).filter(|&value| value != 0.0 && value.is_finite())
 }
 
-/// A message of the parser, which may quote the file, for display.
-fn shown_long(message: &str) -> String {
-    message.chars().take(200).flat_map(char::escape_debug).collect()
-}
-
 /// Reads the header and the XML section.
 pub(super) fn open<'a>(job: &Job<'a>) -> Result<(Pages<'a>, Root), Error> {
     let pages = Pages::new(job)?;
-    let xml = pages.xml(job)?;
-    let root = Root::parse(job, &xml)?;
-    Ok((pages, root))
+    let (xml, cut) = pages.xml(job)?;
+    match (Root::parse(job, &xml), cut) {
+        (Ok(root), None) => Ok((pages, root)),
+        (Ok(root), Some(_)) if !root.scans.is_empty() => Ok((pages, root)),
+        (_, Some(cut)) => Err(cut),
+        (Err(error), None) => Err(error),
+    }
 }

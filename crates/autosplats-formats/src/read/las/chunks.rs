@@ -17,6 +17,9 @@ use super::{
     point14,
 };
 
+/// Most points per byte of the file. Real data need a byte or more per point, but a chunk of equal points far less.
+pub(super) const MAX_RATIO: usize = 1024;
+
 /// Points decompressed between two checks for cancellation.
 const CHECKED: usize = 1 << 16;
 
@@ -33,6 +36,8 @@ pub(super) struct Chunks {
     pub(super) list: Vec<Chunk>,
     /// Whether they have more points than the header states.
     pub(super) more: bool,
+    /// Whether the lengths in the table add up to the place of the table.
+    exact: bool,
     /// Note on a table that cannot be used.
     pub(super) note: Option<String>,
 }
@@ -52,7 +57,7 @@ impl Chunks {
                 0 => return Err("the header states 0 points; nothing else tells how many there are".into()),
                 points => vec![Chunk { bytes: header.point_data..job.bytes.len(), points, inconsistent: false }],
             };
-            return Ok(Self { list, more: false, note: None });
+            return Ok(Self { list, more: false, exact: true, note: None });
         }
         let variable = vlr.uses_variable_size_chunks();
         let search = Search {
@@ -71,14 +76,15 @@ impl Chunks {
         };
         let count = |list: &[Chunk]| list.iter().map(|chunk| chunk.points).sum::<usize>();
         let why = match &by_table {
-            Ok(Self { list, .. }) if count(list) >= stated.max(1) => return by_table,
+            Ok(Self { list, exact: true, .. }) if count(list) >= stated.max(1) => return by_table,
             // A file without points.
             Ok(_) if stated == 0 && table == Some(search.start) => return by_table,
-            Ok(_) => "it lacks points",
-            Err(_) => "it is missing or damaged",
+            Ok(Self { exact: true, .. }) => "it lacks points",
+            Ok(_) | Err(_) => "it is missing or damaged",
         };
         let list = search.one_by_one(table, header.end);
-        if by_table.as_ref().is_ok_and(|chunks| count(&chunks.list) >= count(&list)) || list.is_empty() {
+        let better = |chunks: &Self| (count(&chunks.list), chunks.exact) >= (count(&list), true);
+        if list.is_empty() || by_table.as_ref().is_ok_and(better) {
             return by_table.and_then(|chunks| match count(&chunks.list) {
                 0 if stated > 0 => {
                     Err(format!("the chunks hold none of {stated} points; the file is cut off, copy it again"))
@@ -88,7 +94,7 @@ impl Chunks {
         }
         let found = list.len();
         let note = format!("the table of the compressed chunks cannot be used: {why}; {found} whole chunks are found");
-        Ok(Self { list, more: false, note: Some(note) })
+        Ok(Self { list, more: false, exact: false, note: Some(note) })
     }
 }
 
@@ -147,7 +153,9 @@ impl Search<'_> {
                     None => size,
                 },
             };
-            more |= end > at && held.min(own.unwrap_or(held)) > left;
+            // The last chunk of a fixed size may hold fewer points, unless it states its number.
+            let known = own.map(|own| own.min(held)).or(self.size.is_none().then_some(held));
+            more |= end > at && known.map_or(left == 0, |known| known > left);
             let points = held.min(left);
             if points > 0 {
                 let inconsistent = layered(self.items) && own.is_none();
@@ -156,7 +164,7 @@ impl Search<'_> {
             at = end;
             left -= points;
         }
-        Ok(Chunks { list, more: more && self.stated.is_some(), note: None })
+        Ok(Chunks { list, more: more && self.stated.is_some(), exact: at == table, note: None })
     }
 
     /// The whole chunks before the table, or before `end` if there is none.
@@ -208,7 +216,8 @@ impl Search<'_> {
     fn points_in(&self, chunk: &[u8], size: usize) -> usize {
         let Ok(mut records) = decompressor(self.items, chunk) else { return 0 };
         let mut record = vec![0; self.record_len];
-        (0..if self.thorough { size } else { 0 })
+        let most = if self.thorough { size.min(MAX_RATIO.saturating_mul(chunk.len())) } else { 0 };
+        (0..most)
             .take_while(|index| {
                 let checked = index % CHECKED == 0 && self.job.progress.cancelled();
                 let done = records.get().position() >= chunk.len() as u64;

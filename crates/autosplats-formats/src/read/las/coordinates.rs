@@ -1,6 +1,6 @@
 //! Coordinate system of a LAS file.
 
-use autosplats_cloud::{Crs, CrsDefinition, GeoKeys, Unit, looks_like_degrees};
+use autosplats_cloud::{Crs, CrsDefinition, GeoKeys, Unit, looks_like_degrees, shown_number};
 
 use super::{super::units::LOOKS_LIKE_DEGREES, header::Header, records::Records};
 use crate::las;
@@ -51,7 +51,7 @@ pub(super) fn of(header: &Header, records: &Records<'_>) -> CoordinateSystem {
         let distance = ((low + high) / 2.0).length();
         // The range covers the bottom of the sea and the height of aeroplanes.
         if geocentric && !(6.3e6..6.5e6).contains(&distance) {
-            let metres = format!("{:.0} km", distance / 1000.0);
+            let metres = format!("{} km", shown_number((distance / 1000.0).round()));
             notes.push(format!(
                 "the coordinate system is geocentric, but the points are {metres} from its origin, not 6400"
             ));

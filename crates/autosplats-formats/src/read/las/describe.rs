@@ -1,6 +1,6 @@
 //! Describes a file by its header and variable length records.
 
-use autosplats_cloud::Error;
+use autosplats_cloud::{Error, shown_number};
 
 use super::super::{Attribute, Description, Job};
 use super::{
@@ -24,7 +24,7 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     notes.extend(meaning.notes);
     let tree = records.find("copc", 1).filter(|record| record.data.len() == COPC_INFO && header.compressed);
 
-    let coordinate = |(axis, scale): (&str, f64)| Attribute::new(axis, format!("int32 × {scale}"));
+    let coordinate = |(axis, scale): (&str, f64)| Attribute::new(axis, format!("int32 × {}", shown_number(scale)));
     let mut attributes: Vec<Attribute> =
         ["X", "Y", "Z"].into_iter().zip(header.scale.to_array()).map(coordinate).collect();
     let colors = ["Red", "Green", "Blue"].map(|name| Attribute::new(name, "uint16"));
@@ -44,11 +44,9 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     attributes.extend(colors);
 
     let points = points(job, &mut header, &records, &mut notes);
-    let [low, high] = header.bounds;
-    let valid = low.is_finite() && high.is_finite() && low.cmple(high).all();
     // A header without a number of points was never finished.
-    let bounds = (valid && header.stated > 0).then_some([low, high]);
-    if header.stated > 0 && header.sane_bounds().is_none() {
+    let bounds = header.sane_bounds().filter(|_| header.stated > 0);
+    if header.stated > 0 && bounds.is_none() {
         notes.push("the bounds in the header cannot be those of the points".into());
     }
 
@@ -85,7 +83,7 @@ fn points(job: &Job<'_>, header: &mut Header, records: &Records<'_>, notes: &mut
         }
         return Some(header.points);
     }
-    match laz::Compressed::open(job, header, records, false) {
+    match laz::Compressed::open(job, header, records, header.stated == 0) {
         Ok(Some(compressed)) => {
             notes.extend(compressed.note);
             notes.extend(header.more_than_stated(compressed.points));
@@ -115,7 +113,7 @@ fn details(header: &Header, records: &Records<'_>) -> Vec<(String, String)> {
     let set = flags.into_iter().enumerate().filter(|(bit, _)| header.global_encoding >> bit & 1 == 1);
     detail("global encoding", set.map(|(_, flag)| flag).collect::<Vec<_>>().join(", "));
     // Some files store -0.
-    detail("offset of coordinates", header.offset.to_array().map(|value| (value + 0.0).to_string()).join(", "));
+    detail("offset of coordinates", header.offset.to_array().map(|value| shown_number(value + 0.0)).join(", "));
     detail("variable length records", records.all.len().to_string());
     let returns = &header.points_by_return;
     let last = returns.iter().rposition(|&count| count > 0).map_or(0, |index| index + 1);

@@ -1,5 +1,7 @@
 //! Extra bytes: values beyond those of the point format, described in a variable length record.
 
+use autosplats_cloud::shown_number;
+
 use super::super::{columns::MAX_COLUMNS, table::Scalar};
 use super::{
     header::{Header, bytes_at, text},
@@ -50,8 +52,10 @@ impl Extra {
     pub(super) fn stored(&self) -> String {
         match self.scaled {
             None => self.scalar.name().into(),
-            Some((scale, 0.0)) => format!("{} × {scale}", self.scalar.name()),
-            Some((scale, offset)) => format!("{} × {scale} + {offset}", self.scalar.name()),
+            Some((scale, 0.0)) => format!("{} × {}", self.scalar.name(), shown_number(scale)),
+            Some((scale, offset)) => {
+                format!("{} × {} + {}", self.scalar.name(), shown_number(scale), shown_number(offset))
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The public header of LAS files.
 
-use autosplats_cloud::Error;
+use autosplats_cloud::{Error, shown_number};
 use glam::DVec3;
 
 use super::super::Job;
@@ -67,6 +67,7 @@ impl Header {
         }
         let (scale, offset) = (raw.vector(131, 8), raw.vector(155, 8));
         if !scale.is_finite() || !offset.is_finite() || scale.abs().min_element() == 0.0 {
+            let [scale, offset] = [scale, offset].map(|vector| vector.to_array().map(shown_number).join(", "));
             return Err(fail(131, format!("invalid scale {scale} or offset {offset} of the coordinates")));
         }
         let point_data = raw.u32(96) as usize;

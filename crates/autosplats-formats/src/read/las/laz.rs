@@ -17,7 +17,7 @@ use laz::{LazItem, LazItemType, LazVlr, record::RecordDecompressor};
 
 use super::super::Job;
 use super::{
-    chunks::{Chunk, Chunks},
+    chunks::{Chunk, Chunks, MAX_RATIO},
     columns::{BATCH, Columns, preview},
     decompressor::{DynDecompressor, decompressor, layered},
     header::Header,
@@ -29,9 +29,6 @@ const PIECE: usize = 1 << 11;
 
 /// Most chunks decompressed in parallel; many very short chunks would need much memory for bookkeeping.
 const MAX_CHUNKS: usize = 1 << 10;
-
-/// Most points per byte of the file. Real data need a byte or more per point, but a chunk of equal points far less.
-const MAX_RATIO: u64 = 1024;
 
 /// The compressed points of a file.
 pub(super) struct Compressed<'a> {
@@ -63,12 +60,16 @@ impl<'a> Compressed<'a> {
         let fail = |what: String| job.malformed(format!("byte {}", header.point_data), what);
         let (vlr, chunked) = compression(job, header, records)?;
         check_items(vlr.items(), header).map_err(fail)?;
-        if header.stated > MAX_RATIO.saturating_mul(job.bytes.len() as u64) {
+        let most = MAX_RATIO.saturating_mul(job.bytes.len());
+        if header.stated > most as u64 {
             return Err(fail(format!("{} points cannot be in a file of this size", header.stated)));
         }
-        let Chunks { list: chunks, more, note } =
+        let Chunks { list: chunks, more, note, .. } =
             guard(|| Chunks::find(job, header, &vlr, chunked, thorough)).map_err(fail)?;
         let points = chunks.iter().map(|chunk| chunk.points).sum();
+        if points > most {
+            return Err(fail(format!("{points} points cannot be in a file of this size")));
+        }
         Ok((points > 0).then(|| Self {
             points,
             missing: header.stated.saturating_sub(points as u64),

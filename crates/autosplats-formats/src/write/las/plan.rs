@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use autosplats_cloud::{Axes, Error, Field, FieldValues, PointCloud, each_type};
+use autosplats_cloud::{Axes, Error, Field, FieldValues, PointCloud, each_type, printable};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -390,5 +390,5 @@ fn extra_name(name: &str, others: &[Extra<'_>]) -> String {
 
 /// A name for display in a message.
 fn shown(name: &str) -> String {
-    name.chars().take(60).flat_map(char::escape_debug).collect()
+    printable(&name.chars().take(60).collect::<String>())
 }

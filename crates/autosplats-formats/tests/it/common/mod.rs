@@ -39,6 +39,12 @@ pub(crate) fn shared_data() -> Option<PathBuf> {
     None
 }
 
+/// A file of the folder of field cases, which is beside that of real files.
+pub(crate) fn field_file(name: &str) -> Option<Vec<u8>> {
+    let path = shared_data()?.join("../field").join(name);
+    Some(std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())))
+}
+
 /// The error message that reading `bytes` must give: one line that names the file.
 pub(crate) fn error(name: &str, bytes: &[u8]) -> String {
     let message = match read_bytes(name, bytes) {
