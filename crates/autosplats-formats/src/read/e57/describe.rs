@@ -34,11 +34,11 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     });
     let scans = scans.collect();
     let mut notes = root.notes.clone();
-    notes.extend(root.faults.iter().map(|(scan, what)| format!("{scan} is left out: {what}")));
+    notes.extend(root.faults.iter().map(|(scan, what)| format!("{scan} is left out: XML section: {what}")));
     let poses = root.scans.iter().filter_map(|scan| Some(format!("{}: {}", scan.shown(), scan.pose_note.as_ref()?)));
     notes.extend(poses);
     if pages.cut_off() {
-        notes.push(format!("the file is cut off at byte {}", job.bytes.len()));
+        notes.push(format!("the file is cut off at byte {}; what is left is read", job.bytes.len()));
     }
     Ok(Description {
         format: format!("E57 {major}.{minor}{writer}"),

@@ -90,9 +90,15 @@ fn points(job: &Job<'_>, header: &mut Header, records: &Records<'_>, notes: &mut
             header.points = header.points.max(compressed.points as u64);
         }
         Ok(None) => {}
+        // Reading looks for the chunks one after the other, which takes time.
+        Err(Error::Malformed { .. }) if header.stated > 0 => {
+            notes
+                .push("the table of the compressed chunks cannot be used; reading tells which points are there".into());
+            return Some(header.stated);
+        }
         Err(Error::Malformed { place, what, .. }) => {
             notes.push(format!("{place}: {what}"));
-            return (header.stated > 0).then_some(header.stated);
+            return None;
         }
         Err(error) => notes.push(error.to_string()),
     }

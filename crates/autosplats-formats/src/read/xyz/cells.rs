@@ -68,7 +68,7 @@ impl Dialect {
 
 /// Placeholders that databases, spreadsheets and people write for missing values, separated by semicolons.
 const MISSING: &str = "na;n/a;n.a.;null;(null);<null>;\\n;none;nil;nodata;no data;no_data;no-data;empty;missing;undefined;\
-    #n/a;#na;#nv;#null!;#value!;#wert!;#num!;#div/0!";
+    #n/a;#na;#nv;#null!;#value!;#wert!;#num!;#div/0!;-1.#ind;1.#qnan;-nan(ind)";
 
 /// Whether a cell is empty or holds a placeholder for a missing value.
 pub(super) fn is_missing(cell: &[u8]) -> bool {
