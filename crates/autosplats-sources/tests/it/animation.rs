@@ -132,7 +132,8 @@ fn a_broken_frame_is_said_once_and_playing_goes_on() {
         write(&PointCloud::new(DVec3::ZERO, positions(10 + index)), &path, &()).unwrap();
         if index == 2 {
             let bytes = std::fs::read(&path).unwrap();
-            std::fs::write(&path, &bytes[..bytes.len() - 7]).unwrap();
+            // Inside the header, since what is whole of cut points is read.
+            std::fs::write(&path, &bytes[..40]).unwrap();
         }
     }
     let animation = sequence(folder.path().to_str().unwrap()).unwrap();
@@ -144,7 +145,7 @@ fn a_broken_frame_is_said_once_and_playing_goes_on() {
             match (index, round) {
                 (2, 0) => {
                     let message = next.unwrap_err().to_string();
-                    assert!(message.contains("2.ply: byte "), "with its place: {message}");
+                    assert!(message.contains("2.ply: line "), "with its place: {message}");
                 }
                 (2, _) => assert_eq!(next.unwrap(), Next::Nothing, "not again"),
                 _ => assert!(matches!(next.unwrap(), Next::Update(u) if u.cloud.len() == 10 + index), "frame {index}"),
