@@ -37,7 +37,8 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         (first..first + POINTS - 2).map(|i| format!("{word} {i} {} {}\n", i + 1, i + 2)).collect()
     };
     let vertices: String = positions.lines().map(|row| format!("v {row}\n")).collect();
-    let sweep = |columns: usize| (0..POINTS * columns).flat_map(|i| (0.5 * (i % 40) as f32).to_le_bytes()).collect();
+    let number = |i: usize, columns: usize| 0.5 * (i / columns) as f32 + 20.0 * (i % columns) as f32;
+    let sweep = |columns: usize| (0..POINTS * columns).flat_map(|i| number(i, columns).to_le_bytes()).collect();
     Ok(vec![
         seeds("ply", [written("ply")?, vec![ascii_ply(), list_ply(), mesh_ply()]].concat()),
         seeds("pcd", [written("pcd")?, vec![ascii_pcd(), compressed_pcd()]].concat()),
@@ -47,7 +48,8 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         seeds("ptx", vec![ptx()]),
         seeds("xyz", [written("xyz")?, vec![rows.clone().into_bytes()]].concat()),
         seeds("pts", [written("pts")?, vec![format!("{POINTS}\n{rows}").into_bytes()]].concat()),
-        seeds("csv", [written("csv")?, vec![odd_csv()]].concat()),
+        seeds("csv", [written("csv")?, vec![odd_csv(), grouped_csv()]].concat()),
+        seeds("grd", vec![grid()]),
         seeds("obj", vec![format!("# a\ng b\n{vertices}{}", faces("f", 1)).into_bytes(), odd_obj()]),
         seeds("off", vec![format!("OFF\n{POINTS} {} 0\n{positions}{}", POINTS - 2, faces("3", 0)).into_bytes()]),
         seeds("stl", vec![binary_stl(), text_stl()]),
@@ -57,6 +59,9 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         seeds("pcd.bin", vec![sweep(5)]),
         seeds("pgm", vec![pgm(), b"P2\n# a\n3 2\n65535\n0 1000 2000\n3000 65535 7\n".to_vec()]),
         seeds("png", vec![png()?]),
+        seeds("pfm", vec![pfm()]),
+        seeds("tif", vec![tiff()]),
+        seeds("exr", vec![exr()?]),
         seeds("mcap", recordings("zstd", mcap)),
         seeds("bag", recordings("bz2", bag)),
         seeds("ros1", vec![cloud2().message(Encoding::Ros1, false)]),
@@ -216,6 +221,18 @@ fn ptx() -> Vec<u8> {
         .to_vec()
 }
 
+/// Words before and after the points, names in German, thousands, and a row without coordinates.
+fn grouped_csv() -> Vec<u8> {
+    let rows: String = (0..POINTS).map(|i| format!("P{i};5.401.233,{i};\"3 512 344,5\";{i},25\n")).collect();
+    format!("Project: a\nPunkt;Hochwert;Rechtswert;Höhe\n-;;NULL;N/A\n{rows}END\n").into_bytes()
+}
+
+/// A grid of heights with cells without data, whose rows wrap.
+fn grid() -> Vec<u8> {
+    let heights: String = (0..POINTS).map(|i| if i % 5 == 0 { "-9999\n".into() } else { format!("{i}.5 ") }).collect();
+    format!("ncols 6\nnrows 4\nXLLCENTER 10,5\nyllcorner 20\ndx 1\ndy 2\n{heights}").into_bytes()
+}
+
 fn odd_csv() -> Vec<u8> {
     "\u{feff}\"Easting [m]\";\"Northing\";\"Height\";\"R\";\"G\";\"B\"\r\n1,5;2,5;3,5;1;2;3\r\n4;5;6,25;;255;7;\r\n"
         .into()
@@ -294,6 +311,49 @@ fn png() -> Result<Vec<u8>> {
     let depths = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(6, 4, |x, y| image::Luma([(x * y * 500) as u16]));
     let mut bytes = std::io::Cursor::new(Vec::new());
     depths.write_to(&mut bytes, image::ImageFormat::Png)?;
+    Ok(bytes.into_inner())
+}
+
+/// Depths in metres of an image of 6 × 4 pixels, little-endian.
+fn float_depths() -> Vec<u8> {
+    (0..24).flat_map(|i| (0.25 * i as f32).to_le_bytes()).collect()
+}
+
+fn pfm() -> Vec<u8> {
+    [b"Pf\n6 4\n-1.0\n".to_vec(), float_depths()].concat()
+}
+
+/// One strip of floats.
+fn tiff() -> Vec<u8> {
+    let (short, long) = (3_u16, 4_u16);
+    // Size, bits, no compression, black is 0, the strip's place, channels, rows and bytes, floats.
+    let entries = [
+        (256_u16, short, 6_u32),
+        (257, short, 4),
+        (258, short, 32),
+        (259, short, 1),
+        (262, short, 1),
+        (273, long, 134),
+        (277, short, 1),
+        (278, short, 4),
+        (279, long, 96),
+        (339, short, 3),
+    ];
+    let mut bytes = [b"II*\0".to_vec(), 8_u32.to_le_bytes().to_vec(), 10_u16.to_le_bytes().to_vec()].concat();
+    for (tag, kind, value) in entries {
+        bytes.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
+        bytes.extend([1, value].map(u32::to_le_bytes).concat());
+    }
+    [bytes, vec![0; 4], float_depths()].concat()
+}
+
+fn exr() -> Result<Vec<u8>> {
+    use exr::prelude::{Encoding, Image, SpecificChannels, WritableImage as _};
+    let depth = |at: exr::prelude::Vec2<usize>| ((at.x() + at.y()) as f32,);
+    let channels = SpecificChannels::build().with_channel::<f32>("Z").with_pixel_fn(depth);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let image = Image::from_encoded_channels((6, 4), Encoding::SMALL_LOSSLESS, channels);
+    image.write().non_parallel().to_buffered(&mut bytes)?;
     Ok(bytes.into_inner())
 }
 

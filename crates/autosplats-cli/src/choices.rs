@@ -38,6 +38,14 @@ pub(crate) enum AxesChoice {
     ZUp,
     /// Y is up: models
     YUp,
+    /// X is up
+    XUp,
+    /// Z is down
+    ZDown,
+    /// Y is down: structure from motion
+    YDown,
+    /// X is down
+    XDown,
     /// X right, y down, z forward, seen from the origin: depth cameras
     Camera,
 }

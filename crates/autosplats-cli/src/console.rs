@@ -63,6 +63,11 @@ impl Console {
         &self.interrupt
     }
 
+    /// Whether work goes on: the command has not been asked to end.
+    pub(crate) fn goes_on(&self) -> impl Fn() -> bool + Sync {
+        || !self.interrupt.requested()
+    }
+
     /// The same console; `quiet` leaves out all messages but errors.
     pub(crate) fn quiet(&self, quiet: bool) -> Self {
         Self { quiet: self.quiet || quiet, ..self.clone() }

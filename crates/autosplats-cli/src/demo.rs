@@ -35,7 +35,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
         let camera = scene_camera(scene);
         let supersample = still_supersample(SIZE);
         let size = SIZE.map(|side| side * supersample);
-        let frame = renderer.render(&cloud, &camera, size, &Settings::default())?;
+        let frame = renderer.render_while(&cloud, &camera, size, &Settings::default(), &console.goes_on())?;
         let picture = frame.image.averaged(supersample);
         drop(bar);
         let seconds = started.elapsed().as_secs_f64();

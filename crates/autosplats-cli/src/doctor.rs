@@ -123,7 +123,7 @@ pub(crate) fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
 
 impl Findings {
     fn new(console: &Console) -> Self {
-        let self_test = SelfTest::run();
+        let self_test = SelfTest::run(console);
         let Device { name, threads, simd, .. } = Device::cpu();
         let (simd_used, lanes) = simd_used();
         let available = available_memory();
@@ -236,16 +236,16 @@ impl Findings {
 
 impl SelfTest {
     /// Generates a small scene, renders it, writes it and reads it back.
-    fn run() -> Self {
+    fn run(console: &Console) -> Self {
         let folder = std::env::temp_dir();
         let mut test = Self { temporary_folder: folder.display().to_string(), ..Self::default() };
-        if let Err(error) = test.try_all() {
+        if let Err(error) = test.try_all(console) {
             test.errors.push(error);
         }
         test
     }
 
-    fn try_all(&mut self) -> Result<(), String> {
+    fn try_all(&mut self, console: &Console) -> Result<(), String> {
         let said = |error: &dyn std::fmt::Display| error.to_string();
         let since = |start: Instant| Some(start.elapsed().as_secs_f64() * 1e3);
         let start = Instant::now();
@@ -257,7 +257,7 @@ impl SelfTest {
         let mut render = |renderer: &mut Renderer| {
             let start = Instant::now();
             let Frame { image, counts, .. } = renderer
-                .render(&cloud, &scene_camera(&scene), TEST_SIZE, &Settings::default())
+                .render_while(&cloud, &scene_camera(&scene), TEST_SIZE, &Settings::default(), &console.goes_on())
                 .map_err(|error| said(&error))?;
             if counts.covered * 50 < image.pixels.len() {
                 return Err(format!("the picture of the test scene is nearly empty: {} pixels", counts.covered));

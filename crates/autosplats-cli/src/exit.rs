@@ -53,7 +53,6 @@ impl Failure {
             ErrorKind::Argument => Self::usage(error),
             ErrorKind::Memory => Self::new(Exit::Memory, error),
             ErrorKind::Device => Self::new(Exit::Device, error),
-            ErrorKind::Cancelled => Self::interrupted(),
             _ => Self::new(Exit::Input, error),
         }
     }

@@ -26,7 +26,7 @@ pub(crate) fn settle_first_radius(
         return Ok(());
     }
     let bar = Bar::spinner("finding the first radius", console);
-    let best = best_first_radius(renderer, cloud, camera, size, settings, ACCURACY)?;
+    let best = best_first_radius(renderer, cloud, camera, size, settings, ACCURACY, &console.goes_on())?;
     drop(bar);
     let [share, asked] = [best.accuracy, ACCURACY].map(|share| 100.0 * share);
     let fails =

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use autosplats_cloud::glam::{DMat4, DVec3};
-use autosplats_cloud::{Error, PointCloud, Progress, check_memory, sample_surface};
+use autosplats_cloud::{Error, PointCloud, PointFilter, Progress, check_memory, sample_surface};
 use autosplats_formats::{ReadOptions, read_mesh};
 use autosplats_scenes::{SCENE_PREFIX, Scene};
 use autosplats_sources::{Input, LatestOptions, Live, PlayOptions, Player, Source, beginnings};
@@ -53,9 +53,10 @@ impl PlayingArgs {
 impl ReadingArgs {
     /// The options for the library.
     pub(crate) fn options(&self) -> ReadOptions {
-        let Self { columns, depth_camera, keep_no_returns } = self;
+        let Self { columns, depth_camera, keep, keep_no_returns } = self;
         ReadOptions {
             columns: columns.clone(),
+            keep: keep.clone(),
             depth_camera: *depth_camera,
             keep_no_returns: *keep_no_returns,
             ..ReadOptions::default()
@@ -114,6 +115,14 @@ impl Inputs {
     /// A built-in scene alone.
     pub(crate) fn scene(name: &str) -> Result<Self, Failure> {
         Ok(Self { list: vec![Input::parse(&format!("{SCENE_PREFIX}{name}"))?], poses: Vec::new() })
+    }
+
+    /// Leaves out what pictures usually do not show, unless the user has said what to keep.
+    pub(crate) fn for_pictures(mut self) -> Self {
+        for input in &mut self.list {
+            input.options.keep.get_or_insert_with(PointFilter::usual);
+        }
+        self
     }
 
     /// Reads all digits, for writing the points again.
@@ -259,16 +268,27 @@ impl Inputs {
         };
         let bar = Bar::new(&title, console);
         let parts: Vec<_> = self.list.iter().map(|input| bar.part(self.list.len(), &input.name)).collect();
-        let clouds = self.list.par_iter().zip(&parts).map(|(input, part)| {
-            let cloud = read(input, part).map_err(|error| failure(input, error))?;
-            if cloud.is_empty() {
-                return Err(Failure::new(Exit::Input, format!("{}: there are no points in it", input.name)));
+        let several = self.list.len() > 1;
+        let clouds = self.list.par_iter().zip(&parts).map(|(input, part)| match read(input, part) {
+            Ok(cloud) if cloud.is_empty() => {
+                Err(Failure::new(Exit::Input, format!("{}: there are no points in it", input.name)))
             }
-            Ok((cloud, input.world_from_input))
+            Ok(cloud) => Ok(Some((cloud, input.world_from_input))),
+            // Of the tiles of a survey, some may have no point of a class.
+            Err(Error::NothingKept { filter, points, .. }) if several => {
+                part.note(&format!("--keep {filter} leaves none of its {points} points"));
+                Ok(None)
+            }
+            Err(error) => Err(failure(input, error)),
         });
         // Of several failures, the first input's is reported, independent of timing.
         let clouds: Vec<Result<_, Failure>> = clouds.collect();
         let clouds = clouds.into_iter().collect::<Result<Vec<_>, _>>()?;
+        if clouds.iter().all(Option::is_none) {
+            return Err(Failure::new(Exit::Input, format!("{}: --keep leaves none of their points", self.names())));
+        }
+        let filled = clouds.into_iter().zip(parts).filter_map(|(cloud, part)| Some((cloud?, part)));
+        let (clouds, parts): (Vec<_>, Vec<_>) = filled.unzip();
         note_differences(&clouds, &parts);
         note_distant_inputs(&clouds, &parts);
         Ok(PointCloud::merge(clouds))
@@ -380,11 +400,22 @@ fn is_made(input: &Input) -> bool {
 /// The first points of an input that is played.
 fn first_frame(input: &Input, progress: &dyn Progress) -> Result<PointCloud, Error> {
     let mut player = input.source.play(&input.play, &input.options, progress)?;
-    let frames = player.stream().timeline().map_or(0, |timeline| timeline.stamps().len());
-    if frames > 1 {
-        progress.note(&format!("this is the first of {frames} frames"));
+    let cloud = player.first(Source::FIRST_POINTS_TIMEOUT, progress)?;
+    if let Some(which) = which_frame(&player) {
+        progress.note(&format!("this is {which}"));
     }
-    player.first(Source::FIRST_POINTS_TIMEOUT, progress).map(Arc::unwrap_or_clone)
+    Ok(Arc::unwrap_or_clone(cloud))
+}
+
+/// Which frame of several the player has [first](Player::first) found points in; `None` for a single frame and for live
+/// points.
+pub(crate) fn which_frame(player: &Player) -> Option<String> {
+    let frames = player.stream().timeline()?.len();
+    match player.position()? {
+        _ if frames < 2 => None,
+        0 => Some(format!("the first of {frames} frames")),
+        frame => Some(format!("frame {frame} of 0 to {}, the first with points", frames - 1)),
+    }
 }
 
 /// Plays a file or a folder as it changes.
@@ -401,6 +432,7 @@ fn watch(path: &Path, input: &Input) -> Result<Player, Failure> {
 fn failure(input: &Input, error: Error) -> Failure {
     match error {
         Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
+        Error::NoFrames { why, .. } => Failure::new(Exit::Input, format!("{}: {why}", input.name)),
         error => error.into(),
     }
 }

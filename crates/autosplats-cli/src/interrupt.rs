@@ -3,6 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use autosplats_cloud::Progress;
+
 /// A request to end a command. Clones are the same request.
 ///
 /// A request holds until the command that runs ends, or the next one if none runs. The command stops at the next chance
@@ -53,5 +55,14 @@ impl Interrupt {
     /// Whether the command has been asked to end at once.
     pub(crate) fn requested(&self) -> bool {
         self.0.end_now.load(Ordering::SeqCst)
+    }
+}
+
+/// Of work that shows no progress.
+impl Progress for Interrupt {
+    fn report(&self, _fraction: f32) {}
+
+    fn cancelled(&self) -> bool {
+        self.requested()
     }
 }

@@ -68,7 +68,10 @@ fn exit_code(parsed: Result<CommandLine, clap::Error>, console: &Console) -> u8 
     };
     match outcome {
         Ok(()) => 0,
-        Err(Failure { exit, message }) => {
+        Err(failure) => {
+            // After a request to end, what stops early fails by errors of many kinds.
+            let is_requested = console.interrupt().requested();
+            let Failure { exit, message } = if is_requested { Failure::interrupted() } else { failure };
             console.error(message);
             exit as u8
         }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Error, PointCloud, temporary_beside, write_whole};
 use autosplats_formats::check_writable;
+use autosplats_output::PictureFormat;
 
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
@@ -63,31 +64,22 @@ pub(crate) fn write_file(
     console: &Console,
     write: impl FnOnce(&mut BufWriter<Stoppable<'_>>) -> std::io::Result<()>,
 ) -> Result<u64, Failure> {
-    // A symbolic link stays, and its target is replaced.
-    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let interrupt = console.interrupt();
     let failed = |error: std::io::Error| cannot_write(path, &error);
     let _writing = interrupt.writing();
-    write_whole(&target, failed, |file| {
+    write_whole(path, failed, |file| {
         let mut writer = BufWriter::with_capacity(1 << 18, Stoppable { file: file.get_mut(), interrupt });
-        let written = write(&mut writer).and_then(|()| writer.flush());
-        if interrupt.requested() {
-            return Err(Failure::interrupted());
-        }
-        written.map_err(failed)
+        write(&mut writer).and_then(|()| writer.flush()).map_err(failed)
     })?;
-    metadata(&target).map(|metadata| metadata.len()).map_err(failed)
+    metadata(path).map(|metadata| metadata.len()).map_err(failed)
 }
 
 /// Writes a cloud atomically in the format of the path's extension. Returns the file's size in bytes.
 pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, console: &Console) -> Result<u64, Failure> {
-    // A symbolic link stays, and its target is replaced.
-    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let bar = Bar::on_file("writing", path, console);
     let _writing = console.interrupt().writing();
-    match autosplats_formats::write(cloud, &target, &bar) {
-        Ok(()) => metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
-        Err(Error::Cancelled) => Err(Failure::interrupted()),
+    match autosplats_formats::write(cloud, path, &bar) {
+        Ok(()) => metadata(path).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
         Err(Error::Io { source, .. }) => Err(cannot_write(path, &source)),
         Err(error) => Err(Failure::new(Exit::Output, error)),
     }
@@ -153,20 +145,20 @@ pub(crate) struct Picture {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
-    Png,
+    Picture(PictureFormat),
+    /// All layers.
     Exr,
 }
 
 impl Picture {
     /// Takes the format from the extension.
     pub(crate) fn new(path: PathBuf) -> Result<Self, Failure> {
-        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let format = match extension.as_str() {
-            "png" => Format::Png,
-            "exr" => Format::Exr,
-            _ => {
+        let format = match PictureFormat::of(&path) {
+            Some(format) => Format::Picture(format),
+            None if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr")) => Format::Exr,
+            None => {
                 return Err(Failure::usage(format!(
-                    "{}: unknown picture format; the name must end in .png or .exr",
+                    "{}: unknown picture format; the name must end in .png, .jpg or .exr",
                     path.display()
                 )));
             }

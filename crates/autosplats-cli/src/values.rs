@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
-use autosplats::{Background, ColorMode, MAX_SIDE, Reconstruction};
+use autosplats::{ColorMode, MAX_SIDE, Reconstruction};
 use autosplats_cloud::glam::DVec3;
 use autosplats_formats::DepthCamera;
 use autosplats_scenes::parse_count;
@@ -187,11 +187,11 @@ pub(crate) fn bounds(text: &str) -> Result<[DVec3; 2], String> {
 pub(crate) fn depth_camera(text: &str) -> Result<DepthCamera, String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
     let (fx, fy, cx, cy, scale) = match numbers.as_deref() {
-        Some(&[fx, fy, cx, cy]) => (fx, fy, cx, cy, 1000.0),
-        Some(&[fx, fy, cx, cy, scale]) => (fx, fy, cx, cy, scale),
+        Some(&[fx, fy, cx, cy]) => (fx, fy, cx, cy, None),
+        Some(&[fx, fy, cx, cy, scale]) => (fx, fy, cx, cy, Some(scale)),
         _ => return Err("must be four or five numbers, such as 525,525,319.5,239.5,1000".into()),
     };
-    if fx > 0.0 && fy > 0.0 && scale > 0.0 {
+    if fx > 0.0 && fy > 0.0 && scale.is_none_or(|scale| scale > 0.0) {
         Ok(DepthCamera { fx, fy, cx, cy, scale })
     } else {
         Err("focal lengths and values per metre must be above 0".into())
@@ -220,9 +220,9 @@ pub(crate) fn above_zero(text: &str) -> Result<f64, String> {
 }
 
 /// Parses a range, such as `-2..10` or `-2,10`.
-pub(crate) fn range(text: &str) -> Result<[f32; 2], String> {
+pub(crate) fn range(text: &str) -> Result<[f64; 2], String> {
     let ends = text.split_once("..").or_else(|| text.split_once(','));
-    match ends.and_then(|(low, high)| Some([number::<f32>(low)?, number::<f32>(high)?])) {
+    match ends.and_then(|(low, high)| Some([number::<f64>(low)?, number::<f64>(high)?])) {
         Some([low, high]) if low < high => Ok([low, high]),
         Some(_) => Err("the first number must be the lower one".into()),
         None => Err("must be two numbers, such as 0..2.5 or -1,1".into()),
@@ -247,29 +247,6 @@ pub(crate) fn ortho(text: &str) -> Result<Ortho, String> {
 /// Height of an orthographic picture in world units. `None` fits the cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ortho(pub(crate) Option<f64>);
-
-/// Parses `#rrggbb`, `#top,#bottom` or `transparent`.
-pub(crate) fn background(text: &str) -> Result<Background, String> {
-    let hint = || "must be '#rrggbb', '#top,#bottom' or 'transparent'".to_owned();
-    if text == "transparent" {
-        return Ok(Background::Transparent);
-    }
-    match text.split_once(',') {
-        Some((top, bottom)) => {
-            Ok(Background::Gradient(hex_color(top).ok_or_else(hint)?, hex_color(bottom).ok_or_else(hint)?))
-        }
-        None => hex_color(text).map(Background::Color).ok_or_else(hint),
-    }
-}
-
-fn hex_color(text: &str) -> Option<[u8; 3]> {
-    let digits = text.trim().strip_prefix('#')?;
-    if digits.len() != 6 || !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
-        return None;
-    }
-    let [_, red, green, blue] = u32::from_str_radix(digits, 16).ok()?.to_be_bytes();
-    Some([red, green, blue])
-}
 
 /// Parses one of [`COLOR_MODES`], the name of a field, or `field:NAME` for a field that has the name of a mode.
 pub(crate) fn color(text: &str) -> Result<ColorMode, String> {
@@ -336,16 +313,6 @@ mod tests {
         }
         for bad in ["2..1", "1..1", "1", "nan..2", "..", "0..inf"] {
             assert!(range(bad).is_err(), "{bad} is no range");
-        }
-    }
-
-    #[test]
-    fn backgrounds() {
-        assert_eq!(background("#0a141E"), Ok(Background::Color([10, 20, 30])), "in any letter case");
-        assert_eq!(background("#000000,#ffffff"), Ok(Background::Gradient([0; 3], [255; 3])), "two colours");
-        assert_eq!(background("transparent"), Ok(Background::Transparent), "no colour");
-        for bad in ["red", "#fff", "#+12345", "#12345g", "000000", "#000000,", ""] {
-            assert!(background(bad).is_err(), "{bad} is no background");
         }
     }
 

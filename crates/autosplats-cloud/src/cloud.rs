@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::{DMat4, DVec3};
 
-use crate::{Crs, Error, identity::Identity};
+use crate::{Axes, Crs, Error, identity::Identity};
 
 /// Points of one frame: positions and the attributes that the scanner recorded.
 ///
@@ -72,18 +72,6 @@ impl Scan {
     pub fn position(&self) -> DVec3 {
         self.world_from_sensor.w_axis.truncate()
     }
-}
-
-/// Which axis points up, and from where a viewer looks first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Axes {
-    /// Z up, seen first from -Y. Usual for surveys and robots.
-    ZUp,
-    /// Y up, seen first from +Z. Usual for models.
-    YUp,
-    /// A camera's own frame: x right, y down, z forward. The points were seen from the origin and look right only from
-    /// there.
-    Camera,
 }
 
 /// A named scalar attribute with one value per point.
@@ -261,6 +249,12 @@ impl PointCloud {
     /// Whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
+    }
+
+    /// Whether at least `least` points have a finite position. Stops reading at the point that settles it.
+    pub fn has_finite(&self, least: usize) -> bool {
+        let finite = self.positions.iter().filter(|position| position.iter().all(|value| value.is_finite()));
+        finite.take(least).count() == least
     }
 
     /// Identifies the cloud's points and attributes within this process. Clones share the number; changed points,

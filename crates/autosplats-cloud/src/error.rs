@@ -90,6 +90,26 @@ pub enum Error {
         /// The allowed range.
         rule: &'static str,
     },
+    /// A word of a [`PointFilter`](crate::PointFilter) means nothing.
+    #[error("'{word}' {why}")]
+    BadFilter {
+        /// The word.
+        word: String,
+        /// Fault of the word.
+        why: String,
+    },
+    /// A [`PointFilter`](crate::PointFilter) keeps none of the points of a file.
+    #[error("{}: --keep {filter} leaves none of its {points} points{there}", path.display())]
+    NothingKept {
+        /// The file.
+        path: PathBuf,
+        /// Text of the filter.
+        filter: String,
+        /// Number of points in the file.
+        points: usize,
+        /// What the points are instead, as the end of the sentence.
+        there: String,
+    },
     /// A mesh has no triangle with an area, so there is no surface to sample.
     #[error("there is no surface to sample: no triangle has an area; use the points as they are")]
     NoSurface,
@@ -146,12 +166,16 @@ impl Error {
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::Io { source, .. } => source.into(),
-            Self::UnknownOutput { .. } | Self::BadValue { .. } | Self::UnknownScene { .. } | Self::BadScene { .. } => {
-                ErrorKind::Argument
-            }
-            Self::AttributeLength { .. } | Self::Malformed { .. } | Self::NoSurface | Self::NoFrames { .. } => {
-                ErrorKind::Data
-            }
+            Self::UnknownOutput { .. }
+            | Self::BadValue { .. }
+            | Self::BadFilter { .. }
+            | Self::UnknownScene { .. }
+            | Self::BadScene { .. } => ErrorKind::Argument,
+            Self::AttributeLength { .. }
+            | Self::Malformed { .. }
+            | Self::NothingKept { .. }
+            | Self::NoSurface
+            | Self::NoFrames { .. } => ErrorKind::Data,
             Self::UnknownFormat { .. } | Self::Unsupported { .. } => ErrorKind::Unsupported,
             Self::Remote { .. } => ErrorKind::Io,
             Self::OutOfMemory { .. } => ErrorKind::Memory,

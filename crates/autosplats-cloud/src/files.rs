@@ -52,9 +52,9 @@ impl Deref for Bytes {
 /// Size of the output buffer, in bytes.
 const BUFFER: usize = 1 << 20;
 
-/// Writes a file that appears complete or not at all, and replaces an existing one. `write` fills a
-/// [temporary file](temporary_beside), which is then renamed; on failure it is removed. `failed` makes the caller's
-/// error of one of the operating system.
+/// Writes a file that appears complete or not at all, and replaces an existing one. A symbolic link stays, and its
+/// target is replaced. `write` fills a [temporary file](temporary_beside), which is then renamed; on failure it is
+/// removed. `failed` makes the caller's error of one of the operating system.
 ///
 /// # Errors
 /// Those of `write`, and those of the operating system.
@@ -82,12 +82,13 @@ pub fn write_whole<E>(
     failed: impl Fn(std::io::Error) -> E,
     write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut file = temporary_beside(path, ".tmp").map_err(&failed)?;
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let mut file = temporary_beside(&target, ".tmp").map_err(&failed)?;
     let mut writer = BufWriter::with_capacity(BUFFER, file.as_file_mut());
     write(&mut writer)?;
     writer.flush().map_err(&failed)?;
     drop(writer);
-    file.persist(path).map_err(|error| failed(error.error))?;
+    file.persist(target).map_err(|error| failed(error.error))?;
     Ok(())
 }
 

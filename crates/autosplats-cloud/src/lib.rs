@@ -13,12 +13,16 @@
 //! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
+mod axes;
+mod classes;
 mod cloud;
 mod contents;
 mod crs;
+mod encoding;
 mod error;
 mod error_kind;
 mod files;
+mod filter;
 mod geographic;
 mod guard;
 mod identity;
@@ -30,21 +34,29 @@ mod progress;
 mod random;
 mod retain;
 mod sample;
+mod scale;
 mod thin;
 
-pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
+pub use axes::Axes;
+pub use classes::class_name;
+pub use cloud::{Field, FieldValues, PointCloud, Scan};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
+pub use encoding::{Unmarked, read_text};
 pub use error::{Error, excerpt, one_line, printable, shown_number};
 pub use error_kind::ErrorKind;
 pub use files::{Bytes, temporary_beside, write_whole};
+pub use filter::{LeftOut, PointFilter};
 pub use geographic::{LocalMetres, looks_like_degrees};
 /// Vector library of the public interface.
 pub use glam;
 pub use guard::guard;
 pub use memory::{available_memory, check_memory};
 pub use merge::normal_matrix;
-pub use precision::{degree_origin, residual, sampled_bounds, sampled_middle, storage_origin};
+pub use precision::{
+    RelativeValues, ValueOrigin, degree_origin, residual, sampled_bounds, sampled_middle, storage_origin,
+};
 pub use progress::{Part, Progress};
 pub use random::Random;
 pub use sample::{SurfaceSamples, sample_surface};
+pub use scale::computing_scale_of;

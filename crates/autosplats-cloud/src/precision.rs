@@ -1,6 +1,9 @@
-//! World coordinates in `f32`: the origin that positions are stored about, and what rounding loses.
+//! World coordinates in `f32`: the origin that positions are stored about, and what rounding loses. Values of fields in
+//! `f32` likewise.
 
 use glam::DVec3;
+
+use crate::FieldValues;
 
 /// Coordinates below this magnitude need no origin: the `f32` step there is below a millimetre.
 const MAX_WITHOUT_ORIGIN: f64 = 1e4;
@@ -42,6 +45,71 @@ pub fn sampled_middle(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
         values.get(index).copied().unwrap_or_default().round()
     };
     DVec3::new(median(0), median(1), median(2))
+}
+
+/// The values of a field in `f32`, relative to a value among them. Times of an era in seconds have more digits than
+/// `f32` holds.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{FieldValues, RelativeValues};
+///
+/// let times = FieldValues::F64(vec![300_000_000.0, 300_000_000.25, 300_000_000.5]);
+/// let relative = RelativeValues::new(&times);
+/// assert_eq!(relative.about().origin, 300_000_000.25);
+/// assert_eq!([0, 1, 2].map(|index| relative.get(index)), [-0.25, 0.0, 0.25]);
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct RelativeValues<'a> {
+    values: &'a FieldValues,
+    about: ValueOrigin,
+}
+
+/// What values are relative to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ValueOrigin {
+    /// The value that is added to each.
+    pub origin: f64,
+    /// Step between numbers of the field's type at the origin; 0 for integers.
+    pub precision: f64,
+}
+
+impl<'a> RelativeValues<'a> {
+    /// Finds the origin: the median of a sample, or zero for types that `f32` holds exactly.
+    pub fn new(values: &'a FieldValues) -> Self {
+        let step = values.len().div_ceil(MIDDLE_SAMPLES).max(1);
+        let median = || {
+            let sample = (0..values.len()).step_by(step).map(|index| values.get(index));
+            let mut sample: Vec<f64> = sample.filter(|value| value.is_finite()).collect();
+            sample.sort_by(f64::total_cmp);
+            sample.get(sample.len() / 2).copied().unwrap_or_default()
+        };
+        let about = match values {
+            FieldValues::F64(_) => {
+                let origin = median();
+                ValueOrigin { origin, precision: origin.abs() * f64::EPSILON }
+            }
+            FieldValues::U32(_) | FieldValues::I32(_) | FieldValues::U64(_) | FieldValues::I64(_) => {
+                ValueOrigin { origin: median(), precision: 0.0 }
+            }
+            _ => ValueOrigin::default(),
+        };
+        Self { values, about }
+    }
+
+    /// What the values are relative to.
+    pub fn about(&self) -> ValueOrigin {
+        self.about
+    }
+
+    /// The value of point `index`, without the origin.
+    ///
+    /// # Panics
+    /// If `index` is not below the number of values.
+    pub fn get(&self, index: usize) -> f32 {
+        (self.values.get(index) - self.about.origin) as f32
+    }
 }
 
 /// What rounding a position to `f32` loses.

@@ -18,11 +18,14 @@
 
 mod color_scale;
 mod las;
+mod pinhole;
 mod read;
 mod write;
 
+pub use pinhole::{DepthCamera, PinholeCamera};
 pub use read::{
-    Attribute, DepthCamera, Description, ReadOptions, check_not_lfs_pointer, colors_beside, describe, describe_bytes,
-    formats, framing, gltf_animation, read, read_bytes, read_gltf_at, read_mesh, read_mesh_bytes, read_with, table,
+    Attribute, Description, ReadOptions, check_not_lfs_pointer, colors_beside, describe, describe_bytes, formats,
+    framing, gltf_animation, is_named_as_points, read, read_bytes, read_gltf_at, read_marked, read_mesh,
+    read_mesh_bytes, read_with, table,
 };
 pub use write::{check_writable, write, written_formats};

@@ -1,4 +1,5 @@
-//! Pictures as PNG, their layers as OpenEXR, and successive pictures as numbered files or as a film made by ffmpeg.
+//! Pictures as PNG or JPEG, their layers as OpenEXR, and successive pictures as numbered files or as a film made by
+//! ffmpeg.
 //!
 //! ```no_run
 //! use autosplats_output::{Film, Target};
@@ -18,12 +19,12 @@
 
 mod exr;
 mod film;
-mod png;
+mod picture;
 mod target;
 
 pub use exr::write_exr;
 pub use film::{Film, has_ffmpeg};
-pub use png::write_png;
+pub use picture::{PictureFormat, write_picture, write_png};
 pub use target::{Frames, Target, has_number};
 
 use std::path::PathBuf;

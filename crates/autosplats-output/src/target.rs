@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::Error;
+use crate::{Error, PictureFormat};
 
 /// Most digits of a number in a name.
 const MAX_DIGITS: usize = 12;
@@ -26,7 +26,7 @@ const DIGITS: usize = 5;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// A PNG file per picture.
+    /// A file per picture.
     Frames(Frames),
     /// One film, with its path.
     Film(PathBuf),
@@ -52,32 +52,37 @@ pub struct Frames {
     /// Least digits of the number between `before` and `after`; `None` for a single picture without a number.
     digits: Option<usize>,
     after: String,
+    format: PictureFormat,
 }
 
 impl Target {
-    /// Parses a path. The extensions `.mp4`, `.mkv`, `.webm` and `.mov` mean a film, `.png` numbered pictures. The
-    /// number replaces `%d`, `%05d` or the like, or else is appended to the name with at least five digits.
+    /// Parses a path. The extensions `.mp4`, `.mkv`, `.webm` and `.mov` mean a film, those of a [`PictureFormat`]
+    /// numbered pictures. The number replaces `%d`, `%05d` or the like, or else is appended to the name with at least
+    /// five digits.
     ///
     /// # Errors
     /// [`Error::Name`] if the extension is another one or the name has several numbers.
     pub fn new(path: &Path) -> Result<Self, Error> {
         let refuse = |why: &str| Error::Name { path: path.into(), why: why.into() };
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        match extension.as_deref() {
-            Some("mp4" | "mkv" | "webm" | "mov") => Ok(Self::Film(path.into())),
-            Some("png") => {
+        match (extension.as_deref(), PictureFormat::of(path)) {
+            (Some("mp4" | "mkv" | "webm" | "mov"), _) => Ok(Self::Film(path.into())),
+            (Some(extension), Some(format)) => {
                 let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
                 let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
                 let (before, digits, after) = match number(&name) {
                     Some((place, digits)) => (name[..place.start].into(), digits, name[place.end..].to_owned()),
-                    None => (name[..name.len() - 4].to_owned() + "_", DIGITS, ".png".into()),
+                    None => {
+                        let stem = &name[..name.len() - extension.len() - 1];
+                        (format!("{stem}_"), DIGITS, format!(".{extension}"))
+                    }
                 };
                 if number(&after).is_some() {
                     return Err(refuse("the name has more than one number"));
                 }
-                Ok(Self::Frames(Frames { folder, before, digits: Some(digits), after }))
+                Ok(Self::Frames(Frames { folder, before, digits: Some(digits), after, format }))
             }
-            _ => Err(refuse("the name has to end in .png, .mp4, .mkv, .webm or .mov")),
+            _ => Err(refuse("the name has to end in .png, .jpg, .mp4, .mkv, .webm or .mov")),
         }
     }
 
@@ -135,11 +140,16 @@ impl Target {
 impl Frames {
     /// File of the picture with this number.
     pub fn file(&self, number: usize) -> PathBuf {
-        let Self { folder, before, digits, after } = self;
+        let Self { folder, before, digits, after, .. } = self;
         folder.join(match *digits {
             Some(digits) => format!("{before}{number:0digits$}{after}"),
             None => format!("{before}{after}"),
         })
+    }
+
+    /// The format of the files.
+    pub fn format(&self) -> PictureFormat {
+        self.format
     }
 
     /// Path of all pictures, for messages: "…" stands for the number.
@@ -194,6 +204,7 @@ mod tests {
         let film = Target::new(Path::new("a/film.MP4")).expect("a film");
         assert_eq!(film, Target::Film("a/film.MP4".into()));
         assert_eq!(file("a/f.png", 7), "a/f_00007.png", "numbered");
+        assert_eq!(file("f.JPEG", 7), "f_00007.jpeg", "of any format");
         assert_eq!(file("f%03d_x.png", 7), "f007_x.png", "where it is told");
         assert_eq!(file("%d.png", 12), "12.png", "as wide as it is");
         assert_eq!(file("100%_done.png", 1), "100%_done_00001.png", "a percent sign alone is one");

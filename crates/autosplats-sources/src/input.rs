@@ -6,7 +6,7 @@ use autosplats_cloud::Error;
 use autosplats_formats::ReadOptions;
 use glam::DMat4;
 
-use crate::{PlayOptions, Source};
+use crate::{PlayOptions, Source, source::is_gltf};
 
 /// A source of points, how it is read and played, and its pose in the world.
 ///
@@ -81,9 +81,7 @@ impl Input {
         let PlayOptions { fps, sample, scanners, .. } = &self.play;
         let is_animated = || match &self.source {
             Source::Scene(..) => true,
-            Source::File(path) => {
-                path.extension().is_some_and(|end| end.eq_ignore_ascii_case("glb") || end.eq_ignore_ascii_case("gltf"))
-            }
+            Source::File(path) => is_gltf(path),
             _ => false,
         };
         self.source.moves() || sample.is_some() || scanners.is_some() || fps.is_some() && is_animated()

@@ -6,7 +6,7 @@ use std::{
 };
 
 use autosplats_cloud::Error;
-use autosplats_formats::formats;
+use autosplats_formats::is_named_as_points;
 
 /// The files that a name stands for, in natural order.
 pub(crate) fn candidates(name: &str) -> Result<Vec<PathBuf>, Error> {
@@ -30,9 +30,8 @@ pub(crate) fn candidates(name: &str) -> Result<Vec<PathBuf>, Error> {
 
 /// Whether a file is not hidden and has the extension of a readable format.
 pub(crate) fn is_named_as_cloud(file: &Path) -> bool {
-    let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
-    !name.starts_with('.') && formats().any(|(_, extensions)| extensions.iter().any(ends))
+    let hidden = file.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
+    !hidden && is_named_as_points(file)
 }
 
 /// Natural order of names: `frame_2` before `frame_10`.

@@ -9,7 +9,7 @@ use autosplats_cloud::{Error, PointCloud, Progress};
 use glam::DMat4;
 
 use super::latest::{Latest, LatestOptions, LatestStatistics};
-use crate::{Next, Stream, Update};
+use crate::{Next, Stream, Timeline, Update};
 
 /// Longest wait between two checks for cancellation.
 const MAX_WAIT: Duration = Duration::from_millis(100);
@@ -131,18 +131,33 @@ impl Player {
         Ok(true)
     }
 
-    /// The first frame, or the first update of a live stream. Waits up to `patience`, and longer while
-    /// [bytes](Stream::received) arrive: each arrival starts the wait anew.
+    /// The first frame, or the first update of a live stream, in which a point has a finite position: sensors often
+    /// begin with empty messages. [`position`](Self::position) tells which frame this is.
+    ///
+    /// Waits for a live stream up to `patience`, and longer while [bytes](Stream::received) arrive: each arrival starts
+    /// the wait anew.
     ///
     /// # Errors
-    /// Those of [`frame`](Self::frame) and [`next`](Self::next); [`Error::NoFrames`] if nothing arrives.
+    /// Those of [`frame`](Self::frame) and [`next`](Self::next); [`Error::NoFrames`] if no points come.
     pub fn first(&mut self, patience: Duration, progress: &dyn Progress) -> Result<Arc<PointCloud>, Error> {
-        if self.stream.timeline().is_some() {
-            return self.frame(0, progress);
+        let no_frames = |why: String| Err(Error::NoFrames { name: "the stream".into(), why });
+        if let Some(frames) = self.stream.timeline().map(Timeline::len) {
+            for frame in 0..frames {
+                let cloud = self.frame(frame, progress)?;
+                if cloud.has_finite(1) {
+                    return Ok(cloud);
+                }
+            }
+            return no_frames(match frames {
+                0 | 1 => "there are no points in it".into(),
+                _ => format!("there are no points in any of its {frames} frames"),
+            });
         }
         let (mut since, mut received) = (Instant::now(), self.stream.received());
         while let Some(left) = patience.checked_sub(since.elapsed()) {
-            if let Some(cloud) = self.next(left.min(MAX_WAIT), progress)? {
+            if let Some(cloud) = self.next(left.min(MAX_WAIT), progress)?
+                && cloud.has_finite(1)
+            {
                 return Ok(cloud);
             }
             let now = self.stream.received();
@@ -150,8 +165,12 @@ impl Player {
                 (since, received) = (Instant::now(), now);
             }
         }
-        let why = format!("no points within {} s", patience.as_secs());
-        Err(Error::NoFrames { name: "the stream".into(), why })
+        no_frames(format!("no points within {} s", patience.as_secs()))
+    }
+
+    /// The frame of the timeline that was played last; `None` before the first frame and for a live stream.
+    pub fn position(&self) -> Option<usize> {
+        self.last
     }
 
     /// The frames that must be read to show `frame`, in order.

@@ -189,11 +189,12 @@ impl Source {
         matches!(self, Self::Recording(_)).then(|| timeline.span()).flatten()
     }
 
-    /// Reads or generates the cloud. A source that changes gives its first frame.
+    /// Reads or generates the cloud. A source that changes gives its [first](Player::first) frame with points.
     ///
     /// # Errors
     /// Those of [`read`](autosplats_formats::read), of [`Scene::sample`] or of [`play`](Self::play).
     pub fn read(&self, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
+        self.check_filter(options)?;
         match self {
             Self::File(path) => read_with(path, options, progress),
             Self::Scene(scene, count) => scene.sample(*count, progress),
@@ -214,6 +215,7 @@ impl Source {
     /// - [`Error::NoSurface`] if samples or scanners are asked for and there is no surface.
     /// - The errors of reading what all frames share.
     pub fn play(&self, play: &PlayOptions, options: &ReadOptions, progress: &dyn Progress) -> Result<Player, Error> {
+        self.check_filter(options)?;
         let fps = play.fps.unwrap_or(MOTION_FPS);
         let animation = match self {
             Self::Recording(path) => {
@@ -240,8 +242,7 @@ impl Source {
             Self::Scene(scene, count) => Animation::scene(scene, *count, fps)?,
             Self::File(path) => {
                 let still = || Ok(Animation::still(read_mesh(path, options, progress)?));
-                let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-                if extension == "glb" || extension == "gltf" {
+                if is_gltf(path) {
                     match Animation::gltf(path, fps, progress) {
                         Err(Error::NoFrames { .. }) => still()?,
                         animation => animation?,
@@ -262,6 +263,22 @@ impl Source {
         Ok(Player::new(Box::new(animation.play()), play.latest.clone()))
     }
 
+    /// Fails if points without classes, flags and returns shall be filtered by these.
+    fn check_filter(&self, options: &ReadOptions) -> Result<(), Error> {
+        let filtered = options.keep.as_ref().filter(|filter| !filter.is_all() && !filter.is_usual());
+        let lacking = match self {
+            Self::Scene(..) => "generated scenes",
+            Self::File(path) if is_gltf(path) => "the points of glTF",
+            _ => return Ok(()),
+        };
+        filtered.map_or(Ok(()), |filter| {
+            Err(Error::BadFilter {
+                word: filter.to_string(),
+                why: format!("cannot be kept: {lacking} have no classes"),
+            })
+        })
+    }
+
     /// Plays a stream of points without a surface.
     fn plain(stream: impl Stream + 'static, play: &PlayOptions) -> Result<Player, Error> {
         if play.sample.is_some() || play.scanners.is_some() {
@@ -269,6 +286,11 @@ impl Source {
         }
         Ok(Player::new(Box::new(stream), play.latest.clone()))
     }
+}
+
+/// Whether a file is called like a glTF, which may be animated.
+pub(crate) fn is_gltf(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("glb") || end.eq_ignore_ascii_case("gltf"))
 }
 
 #[cfg(test)]

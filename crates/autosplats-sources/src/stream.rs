@@ -195,6 +195,11 @@ impl Timeline {
     }
 }
 
+/// A frame without points if a filter keeps none of them, since an object may leave the scene.
+pub(crate) fn or_empty(frame: Result<PointCloud, Error>) -> Result<PointCloud, Error> {
+    if matches!(frame, Err(Error::NothingKept { .. })) { Ok(PointCloud::default()) } else { frame }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

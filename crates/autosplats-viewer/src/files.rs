@@ -20,7 +20,7 @@ pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Option<Vec<Pat
     let context = context.clone();
     spawn("dialog", move || {
         let extensions: Vec<&str> =
-            autosplats_formats::formats().flat_map(|(_, extensions)| extensions).copied().collect();
+            autosplats_formats::formats().flat_map(|(_, extensions)| extensions).copied().chain(["gz"]).collect();
         let dialog =
             rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
         // Tests have no user to ask.

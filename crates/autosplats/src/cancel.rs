@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use autosplats_cloud::Progress;
+
 use crate::Error;
 
 /// Asks the caller of a frame whether to go on.
@@ -37,5 +39,13 @@ impl<'a> Cancel<'a> {
     /// [`Error::Cancelled`] if the frame is given up.
     pub(crate) fn check(&self) -> Result<(), Error> {
         if self.is_given_up() { Err(Error::Cancelled) } else { Ok(()) }
+    }
+}
+
+impl Progress for Cancel<'_> {
+    fn report(&self, _fraction: f32) {}
+
+    fn cancelled(&self) -> bool {
+        self.is_given_up()
     }
 }

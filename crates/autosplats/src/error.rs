@@ -34,6 +34,9 @@ pub enum Error {
         /// The valid range.
         range: &'static str,
     },
+    /// The text is no background.
+    #[error("'{0}' must be a CSS colour such as white, '#rrggbb', TOP,BOTTOM or transparent")]
+    Background(String),
     /// A side of the image is 0 or longer than [`MAX_SIDE`].
     #[error("image size {width}x{height}: each side must be within 1 to {MAX_SIDE}")]
     ImageSize {
@@ -111,9 +114,11 @@ impl Error {
     #[must_use]
     pub fn kind(&self) -> ErrorKind {
         match self {
-            Self::Camera(_) | Self::Setting { .. } | Self::ImageSize { .. } | Self::MissingAttribute { .. } => {
-                ErrorKind::Argument
-            }
+            Self::Camera(_)
+            | Self::Setting { .. }
+            | Self::Background(_)
+            | Self::ImageSize { .. }
+            | Self::MissingAttribute { .. } => ErrorKind::Argument,
             Self::Layers { .. } | Self::NothingVisible(_) | Self::Normals { .. } => ErrorKind::Data,
             Self::TooManyPoints(_) | Self::DeviceLimit { .. } | Self::DeviceMemory(_) => ErrorKind::Memory,
             Self::Device(_) | Self::DeviceLost(_) | Self::Texture(_) => ErrorKind::Device,

@@ -1,6 +1,7 @@
 //! `cargo xtask formats`: writes docs/FORMATS.md from the program's own description of its formats and from the test
 //! data.
 
+mod kinds;
 mod outcome;
 mod words;
 
@@ -16,8 +17,9 @@ use serde_json::Value;
 use crate::lanes::in_lanes;
 use crate::{FEATURES, cargo_command};
 
+use self::kinds::{KINDS, KINDS_TEXT};
 use self::outcome::{FileOutcome, FileRow};
-use self::words::{FILES_TEXT, FORMAT_TEXTS, HEAD_TEXT};
+use self::words::{FIELD_TEXT, FILES_TEXT, FORMAT_TEXTS, HEAD_TEXT};
 
 /// Files that are looked at beside each other.
 const PROCESSES: usize = 2;
@@ -64,11 +66,20 @@ fn data(root: &Path) -> Result<PathBuf> {
     data.canonicalize().with_context(|| format!("{}: the test data are needed", data.display()))
 }
 
+/// The folder of small files with a fault each, beside the test data.
+fn field(data: &Path) -> Result<PathBuf> {
+    let field = data.join("../field");
+    field.canonicalize().with_context(|| format!("{}: the field cases are needed", field.display()))
+}
+
 fn document(root: &Path, program: &Path) -> Result<String> {
     let mut document = HEAD_TEXT.to_owned();
     formats(program, &mut document)?;
     schema(program, &mut document)?;
-    files(program, &data(root)?, &mut document)?;
+    kinds(&mut document);
+    let data = data(root)?;
+    files(program, &data, FILES_TEXT, &mut document)?;
+    files(program, &field(&data)?, FIELD_TEXT, &mut document)?;
     Ok(document)
 }
 
@@ -129,8 +140,16 @@ fn schema(program: &Path, document: &mut String) -> Result<()> {
     Ok(())
 }
 
-/// Writes the table of files.
-fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
+/// Writes the table of kinds of faults.
+fn kinds(document: &mut String) {
+    let _ = write!(document, "\n{KINDS_TEXT}\n| what a file has | what becomes of it |\n|---|---|\n");
+    for kind in KINDS {
+        let _ = writeln!(document, "| {} | {} |", kind.fault, kind.outcome);
+    }
+}
+
+/// Writes the table of the files of a folder.
+fn files(program: &Path, data: &Path, text: &str, document: &mut String) -> Result<()> {
     let mut names = Vec::new();
     collect(data, data, &mut names)?;
     let pictures = tempfile::tempdir()?;
@@ -140,7 +159,7 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
         let base = name.rsplit('/').next().unwrap_or(name);
         COMPANION_FILES.iter().find(|(part, _)| base.starts_with(part) || base.ends_with(part)).map(|(_, about)| *about)
     };
-    let is_recording = |name: &str| name.ends_with(".mcap") && !name.contains("lfs");
+    let is_recording = |name: &str| (name.ends_with(".mcap") && !name.contains("lfs")) || name.ends_with(".bag");
     let outcomes = in_lanes(PROCESSES, &names, |name| {
         if companion(name).is_some() || is_recording(name) {
             return Ok(None);
@@ -162,7 +181,7 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
         }
     }
     document.push('\n');
-    document.push_str(FILES_TEXT);
+    document.push_str(text);
     document
         .push_str("\n| file | format | points | attributes | bounds | unit, system | sensors | notes | rendered |\n");
     document.push_str("|---|---|---|---|---|---|---|---|---|\n");
@@ -170,10 +189,10 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
     let points: usize = rows.iter().map(FileRow::files).sum();
     let read: usize = rows.iter().filter(|row| row.is_read()).map(FileRow::files).sum();
     let rendered: usize = rows.iter().filter(|row| row.is_rendered()).map(FileRow::files).sum();
-    let _ = writeln!(
-        document,
-        "\nOf {points} point files, {read} are read and {rendered} are rendered.\n\nFiles without points:\n"
-    );
+    let _ = writeln!(document, "\nOf {points} point files, {read} are read and {rendered} are rendered.");
+    if !others.is_empty() {
+        document.push_str("\nFiles without points:\n\n");
+    }
     for (about, names) in others {
         let _ = writeln!(document, "- {about}: {}", names.join(", "));
     }

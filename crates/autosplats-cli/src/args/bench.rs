@@ -37,10 +37,10 @@ pub(crate) struct BenchArgs {
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,
     /// Width and height of the picture in pixels, each 1 to 16384
-    #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
+    #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size, allow_hyphen_values = true)]
     pub(crate) size: [u32; 2],
     /// Number of frames to measure, 1 to 100000, after three that are not measured
-    #[arg(long, value_name = "COUNT", default_value = "20", value_parser = values::frames)]
+    #[arg(long, value_name = "COUNT", default_value = "20", value_parser = values::frames, allow_negative_numbers = true)]
     pub(crate) frames: usize,
     /// Treat the points as new in each frame, like a live scanner's; a GPU has to upload them every time
     #[arg(long)]

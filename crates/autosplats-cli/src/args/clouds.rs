@@ -44,7 +44,7 @@ pub(crate) struct ThinningArgs {
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds, allow_hyphen_values = true)]
     pub(crate) bounds: Option<[DVec3; 2]>,
     /// Keep the first of every COUNT points
-    #[arg(long, value_name = "COUNT", value_parser = values::step)]
+    #[arg(long, value_name = "COUNT", value_parser = values::step, allow_negative_numbers = true)]
     pub(crate) every: Option<usize>,
     /// Keep one point per cube of edge length SIZE, in the input's units: the point nearest to the mean of its cube
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
@@ -53,7 +53,7 @@ pub(crate) struct ThinningArgs {
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,
     /// Seed of noise and samples; the same seed gives the same points
-    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, allow_negative_numbers = true)]
     pub(crate) seed: u64,
 }
 
@@ -120,7 +120,7 @@ occur. Later versions may add fields.
   points_in_header  number of points that the header states
   faces             number of faces of a mesh
   bounds            smallest and largest coordinates: {min: [x, y, z], max: [...], size: [...]}
-  axes              {name: z-up, y-up or camera, guessed: true if from the cloud's shape}
+  axes              {name: such as z-up, y-down or camera, guessed: true if from the shape}
   crs               {name, epsg, wkt, unit, vertical_unit, metres_per_unit}, as the file states
   resolution        step that coordinates are multiples of: [x, y, z]
   spacing           distance to the nearest other point, at up to 10,000 points spread over

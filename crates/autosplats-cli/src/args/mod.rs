@@ -88,7 +88,7 @@ impl Command {
 #[command(next_help_heading = "Running")]
 pub(crate) struct RunArgs {
     /// Number of threads, 1 to 1024; results do not depend on it [default: one per core]
-    #[arg(long, value_name = "COUNT", value_parser = values::threads)]
+    #[arg(long, value_name = "COUNT", value_parser = values::threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<u16>,
     /// Print only errors on standard error, no progress and no summary
     #[arg(long)]

@@ -29,7 +29,7 @@ pub(crate) struct TopicsArgs {
     /// Address of a router or node, zenoh://HOST[:PORT][/?domain=N]; zenoh:/// searches the local network
     pub(crate) address: String,
     /// Longest time to listen, such as 2s or 500ms
-    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = values::duration)]
+    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = values::duration, allow_hyphen_values = true)]
     pub(crate) wait: Duration,
     /// Print one JSON object per line and topic on standard output
     #[arg(long)]

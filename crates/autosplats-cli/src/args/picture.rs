@@ -31,7 +31,7 @@ pub(crate) struct CameraArgs {
     /// Orthographic projection, HEIGHT world units high; 'fit' shows everything
     #[arg(long, value_name = "HEIGHT", value_parser = values::ortho, allow_negative_numbers = true, conflicts_with = "camera")]
     pub(crate) ortho: Option<Ortho>,
-    /// Read the camera from a file that --save-camera wrote
+    /// Read the camera from a file that --save-camera wrote, or from Open3D's JSON of a camera with an extrinsic
     #[arg(long, value_name = "FILE")]
     pub(crate) camera: Option<PathBuf>,
     /// Write the camera of this picture to a JSON file, for --camera
@@ -142,11 +142,11 @@ pub(crate) struct SurfaceArgs {
 pub(crate) struct LookArgs {
     /// auto, rgb, plain, height, intensity, classification, normal, curvature, radius, k-radius, depth, or the name of
     /// a field (field:NAME if a mode has the same name)
-    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = values::color)]
+    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = values::color, allow_hyphen_values = true)]
     pub(crate) color: ColorMode,
     /// Values at both ends of the colour map [default: 1st and 99th percentile of the picture]
     #[arg(long, value_name = "A..B", value_parser = values::range, allow_hyphen_values = true)]
-    pub(crate) range: Option<[f32; 2]>,
+    pub(crate) range: Option<[f64; 2]>,
     /// Colour map of scalar values [default: reds for radii, gray for intensity, otherwise viridis]
     #[arg(long, value_enum)]
     pub(crate) color_map: Option<Map>,
@@ -166,7 +166,8 @@ pub(crate) struct LookArgs {
     /// Look of a surface's back, the side that its sensor did not see; needs sensor positions in the file
     #[arg(long, value_enum, default_value_t = BacksChoice::Toned)]
     pub(crate) backs: BacksChoice,
-    /// '#rrggbb', '#top,#bottom' or transparent [default: dark grey gradient]
-    #[arg(long, value_name = "COLOR", value_parser = values::background)]
+    /// Colour by its CSS name such as white, or '#rrggbb'; two as TOP,BOTTOM for a gradient; or transparent, for .png
+    /// and .exr [default: dark grey gradient]
+    #[arg(long, value_name = "COLOR", allow_hyphen_values = true)]
     pub(crate) background: Option<Background>,
 }

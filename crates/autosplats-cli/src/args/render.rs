@@ -14,6 +14,7 @@ Examples:
   autosplats render scan.laz -o scan.png
   autosplats render scan.laz -o scan.png --view top --color height --legend
   autosplats render scan.laz -o print.png --size 6000x4000 --supersample 2
+  autosplats render scan.laz -o paper.jpg --background white
   autosplats render bunny.ply -o bunny.png -o bunny.exr --size 800x600 --background transparent
   autosplats render a.ply b.ply --pose b.ply=b.txt -o both.png
   autosplats render drive.mcap --decay 1s --frames 0..99 -o drive_%05d.png
@@ -34,21 +35,21 @@ pub(crate) struct RenderArgs {
     pub(crate) inputs: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
-    /// File to write, can be repeated; an existing file is replaced: .png (8 bit) or .exr (layers). A name with a
-    /// number, such as f_%05d.png, gives a picture per frame; .mp4, .mkv, .webm or .mov a film at its own speed (needs
-    /// ffmpeg)
+    /// File to write, can be repeated; an existing file is replaced: .png, .jpg (8 bit) or .exr (layers). A name
+    /// with a number, such as f_%05d.png, gives a picture per frame; .mp4, .mkv, .webm or .mov a film at its own speed
+    /// (needs ffmpeg)
     #[arg(short, long = "out", value_name = "FILE", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
     /// Width and height of the picture in pixels, each 1 to 16384
-    #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
+    #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size, allow_hyphen_values = true)]
     pub(crate) size: [u32; 2],
-    /// Render FACTOR times as wide and high and average down, 1 to 8. This makes .png pictures smoother and finer
+    /// Render FACTOR times as wide and high and average down, 1 to 8. This makes pictures smoother and finer
     /// [default: 2 for stills of up to 1920x1080 pixels; 1 for larger ones, frames and .exr layers]
-    #[arg(long, value_name = "FACTOR", value_parser = clap::value_parser!(u32).range(1..=8))]
+    #[arg(long, value_name = "FACTOR", value_parser = clap::value_parser!(u32).range(1..=8), allow_negative_numbers = true)]
     pub(crate) supersample: Option<u32>,
     /// Frames to render, counted from 0, both ends included: 0..99, 50.., ..9 or 7; of live input, updates as they
     /// come. Several frames go to numbered files [default: all for a numbered name or a film, else the first]
-    #[arg(long, value_name = "A..B", value_parser = values::frame_range, help_heading = "Points that move")]
+    #[arg(long, value_name = "A..B", value_parser = values::frame_range, allow_hyphen_values = true, help_heading = "Points that move")]
     pub(crate) frames: Option<FrameRange>,
     /// Skip frames whose picture exists
     #[arg(long, help_heading = "Points that move")]

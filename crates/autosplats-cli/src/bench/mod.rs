@@ -125,7 +125,7 @@ fn measure(
     for frame in 0..WARM_UP_FRAMES + args.frames {
         let cloud = other.as_ref().filter(|_| frame % 2 == 1).unwrap_or(cloud);
         let started = Instant::now();
-        let rendered = renderer.render(cloud, &camera, args.size, &settings)?;
+        let rendered = renderer.render_while(cloud, &camera, args.size, &settings, &console.goes_on())?;
         let picture_ms = started.elapsed().as_secs_f64() * 1e3;
         if frame == 0 {
             (counts, first_upload_ms) = (rendered.counts, rendered.timings.upload);

@@ -1,7 +1,7 @@
 //! Examines an input: from its name to a report.
 
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use autosplats::guess_axes;
 use autosplats_cloud::glam::DVec3;
@@ -16,7 +16,7 @@ use super::statistics::{Statistics, Values};
 use crate::args::InputArgs;
 use crate::console::Console;
 use crate::exit::Failure;
-use crate::input::Inputs;
+use crate::input::{Inputs, which_frame};
 use crate::progress::Bar;
 
 /// Size in bytes from which files are read one at a time. Reading one uses all cores, and two might not fit into
@@ -114,13 +114,20 @@ impl Examiner {
             let seconds = timeline.duration().as_secs_f64();
             report.details.insert(0, detail("frames", format!("{} in {seconds:.2} s", timeline.len())));
         }
-        let cloud = player.first(Source::FIRST_POINTS_TIMEOUT, &listener)?;
+        let cloud = match player.first(Source::FIRST_POINTS_TIMEOUT, &listener) {
+            // What a recording without points holds is worth a report.
+            Err(Error::NoFrames { .. }) if player.stream().timeline().is_some() => Arc::default(),
+            cloud => cloud?,
+        };
         for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
             report.warn(note);
         }
         drop(bar);
         report.format.get_or_insert_with(|| "sequence of files".into());
-        report.warn("points, bounds and attributes are those of the first frame".into());
+        if !cloud.is_empty() {
+            let which = which_frame(&player).unwrap_or_else(|| "the first frame".into());
+            report.warn(format!("points, bounds and attributes are those of {which}"));
+        }
         report.scan(&cloud, &[]);
         Ok(())
     }

@@ -23,7 +23,9 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Result<(), Failure> {
     // All digits are read, so that the report is true of the file.
     let options = ReadOptions { exact: true, ..args.reading.options() };
     let several = args.inputs.len() > 1;
-    let examiner = Examiner::new(options, args.scan, console.quiet(several));
+    // The header counts the points that are left out too.
+    let scan = args.scan || options.keep.as_ref().is_some_and(|filter| !filter.is_all());
+    let examiner = Examiner::new(options, scan, console.quiet(several));
 
     let next = AtomicUsize::new(0);
     let (sender, reports) = channel();

@@ -55,12 +55,7 @@ pub(super) struct AxesFound {
 
 impl AxesFound {
     pub(super) fn new(axes: Axes, guessed: bool) -> Self {
-        let name = match axes {
-            Axes::ZUp => "z-up",
-            Axes::YUp => "y-up",
-            Axes::Camera => "camera",
-        };
-        Self { name, guessed }
+        Self { name: axes.name(), guessed }
     }
 }
 

@@ -16,7 +16,8 @@ const MAX_SAMPLES: usize = 10_000;
 /// Number of neighbours that the density is measured with.
 const DENSITY_NEIGHBORS: usize = 12;
 
-/// Points with a coordinate beyond this are left out: squares of their distances may exceed `f32`.
+/// Points with a coordinate beyond this, at the scale of computing, are left out: squares of their distances may exceed
+/// `f32`.
 const MAX_COORDINATE: f32 = 1e18;
 
 /// Distance to the nearest other point, in the file's units.
@@ -40,10 +41,11 @@ pub(super) struct Density {
 /// Measures at up to [`MAX_SAMPLES`] points spread over the cloud. The choice of samples is deterministic.
 pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) {
     let Ok(len) = u32::try_from(cloud.len()) else { return (None, None) };
-    let positions = cloud.positions();
-    let near = |&index: &u32| positions[index as usize].iter().all(|value| value.abs() < MAX_COORDINATE);
+    let factor = cloud.computing_scale();
+    let scaled = |index: u32| cloud.positions()[index as usize].map(|along| (f64::from(along) * factor) as f32);
+    let near = |&index: &u32| scaled(index).iter().all(|value| value.abs() < MAX_COORDINATE);
     let indices: Vec<u32> = (0..len).into_par_iter().filter(near).collect();
-    let points: Vec<[f32; 3]> = indices.par_iter().map(|&index| positions[index as usize]).collect();
+    let points: Vec<[f32; 3]> = indices.par_iter().map(|&index| scaled(index)).collect();
     if points.len() < 2 {
         return (None, None);
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use autosplats_cloud::{FieldValues, PointCloud};
+use autosplats_cloud::{FieldValues, PointCloud, class_name};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -189,41 +189,6 @@ impl Statistics {
             statistics.histogram = Some(Histogram { edges: edges.collect(), counts });
         }
         statistics
-    }
-}
-
-/// Name of an ASPRS standard class (LAS 1.4 R15, table 17).
-fn class_name(class: f64) -> Option<&'static str> {
-    const NAMES: [&str; 23] = [
-        "never classified",
-        "unclassified",
-        "ground",
-        "low vegetation",
-        "medium vegetation",
-        "high vegetation",
-        "building",
-        "low point (noise)",
-        "model key point",
-        "water",
-        "rail",
-        "road surface",
-        "overlap",
-        "wire, guard",
-        "wire, conductor",
-        "transmission tower",
-        "wire connector",
-        "bridge deck",
-        "high noise",
-        "overhead structure",
-        "ignored ground",
-        "snow",
-        "temporal exclusion",
-    ];
-    match class {
-        0.0..=22.0 => Some(NAMES[class as usize]),
-        23.0..=63.0 => Some("reserved"),
-        64.0..=255.0 => Some("user-defined"),
-        _ => None,
     }
 }
 

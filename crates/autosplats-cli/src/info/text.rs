@@ -14,6 +14,9 @@ const INDENT: usize = 14;
 /// Most sensors shown.
 const MAX_SCANS: usize = 8;
 
+/// Names of the flags of LAS.
+const FLAGS: [&str; 5] = ["Synthetic", "KeyPoint", "Withheld", "Overlap", "EdgeOfFlightLine"];
+
 impl Report {
     /// Whether the report has more than an error.
     pub(super) fn is_known(&self) -> bool {
@@ -46,9 +49,8 @@ impl Report {
         }
         if let Some(axes) = &self.axes {
             let about = match axes.name {
-                "z-up" => "z is up",
-                "y-up" => "y is up",
-                _ => "a camera's: x right, y down, z forward",
+                "camera" => "a camera's: x right, y down, z forward".into(),
+                name => name.replace('-', " is "),
             };
             fact("axes", format!("{about}{}", if axes.guessed { " (guessed from the shape)" } else { "" }));
         }
@@ -91,6 +93,7 @@ impl Report {
         }
         self.attribute_table(&mut page);
         self.class_table(&mut page);
+        self.flag_table(&mut page);
         self.scan_table(&mut page);
         self.header_facts(&mut page);
         for warning in &self.warnings {
@@ -118,7 +121,7 @@ impl Report {
 
     fn shown_size(&self, bounds: &Bounds) -> String {
         let decimals = self.decimals(bounds);
-        let [x, y, z] = [0, 1, 2].map(|axis| format!("{:.*}", decimals[axis], bounds.size[axis]));
+        let [x, y, z] = [0, 1, 2].map(|axis| number(bounds.size[axis], decimals[axis]));
         let metric = self.crs.metres_per_unit.filter(|metres| *metres != 1.0);
         let metric = metric.map_or_else(String::new, |metres| {
             let [x, y, z] = bounds.size.map(|size| short(size * metres));
@@ -255,6 +258,24 @@ impl Report {
                 let name = value.name.unwrap_or_default();
                 let _ = writeln!(page, "  {:>5} {name:<22} {:>13} {share:>6.2} %", value.value, counted(value.count));
             }
+        }
+    }
+
+    /// Numbers of points with the flags of LAS.
+    fn flag_table(&self, page: &mut String) {
+        let flagged = |attribute: &AttributeFound| -> u64 {
+            let is_flag = FLAGS.iter().any(|flag| flag.eq_ignore_ascii_case(&attribute.name));
+            let set = attribute.statistics.values.iter().filter(|value| is_flag && value.value > 0.0);
+            set.map(|value| value.count).sum()
+        };
+        let found = self.attributes.iter().map(|attribute| (attribute, flagged(attribute)));
+        let rows: Vec<_> = found.filter(|(_, count)| *count > 0).collect();
+        if !rows.is_empty() {
+            page.push_str("\n  flag                                points\n");
+        }
+        for (AttributeFound { name, .. }, count) in rows {
+            let share = 100.0 * count as f64 / self.points.unwrap_or(1).max(1) as f64;
+            let _ = writeln!(page, "  {:<28} {:>13} {share:>6.2} %", plain(name), counted(count));
         }
     }
 

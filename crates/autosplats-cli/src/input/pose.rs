@@ -1,16 +1,16 @@
 //! Poses: files that place an input in the world.
 
-use std::fs::read_to_string;
 use std::path::Path;
 
 use autosplats_cloud::glam::{DMat4, DQuat, DVec3, DVec4};
+use autosplats_cloud::read_text;
 
 use crate::exit::{Exit, Failure};
 
 /// Reads a pose from a text file: a row-major 4x4 or 3x4 matrix, or a translation and a quaternion. Blanks or commas
 /// separate the numbers, `#` begins a comment.
 pub(super) fn read_pose(path: &Path) -> Result<DMat4, Failure> {
-    let text = read_to_string(path).map_err(|error| error.to_string());
+    let text = read_text(path).map_err(|error| error.to_string());
     let bad = |what: String| Failure::new(Exit::Input, format!("{}: {what}", path.display()));
     text.and_then(|text| parse_pose(&text)).map_err(bad)
 }

@@ -1,12 +1,12 @@
 //! The camera: from flags to a placed eye.
 
-use std::fs::read_to_string;
 use std::io::{Error, Write as _};
 use std::path::{Path, PathBuf};
 
 use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{Axes, PointCloud};
+use autosplats_cloud::{Axes, PointCloud, read_text};
+use autosplats_formats::PinholeCamera;
 use autosplats_scenes::{Scene, View};
 use serde_json::error::Category;
 
@@ -39,15 +39,19 @@ enum CameraPlacement {
 
 impl CameraJob {
     /// Parses the flags and reads the file of `--camera`.
-    pub(super) fn new(args: &CameraArgs) -> Result<Self, Failure> {
+    pub(super) fn new(args: &CameraArgs, console: &Console) -> Result<Self, Failure> {
         let axes = match args.axes {
             AxesChoice::Auto => None,
             AxesChoice::ZUp => Some(Axes::ZUp),
             AxesChoice::YUp => Some(Axes::YUp),
+            AxesChoice::XUp => Some(Axes::XUp),
+            AxesChoice::ZDown => Some(Axes::ZDown),
+            AxesChoice::YDown => Some(Axes::YDown),
+            AxesChoice::XDown => Some(Axes::XDown),
             AxesChoice::Camera => Some(Axes::Camera),
         };
         let place = match (&args.camera, args.eye) {
-            (Some(path), _) => CameraPlacement::File(path.clone(), load(path)?),
+            (Some(path), _) => CameraPlacement::File(path.clone(), load(path, console)?),
             (None, Some(eye)) => CameraPlacement::Eye { eye, look_at: args.look_at, up: args.up },
             (None, None) => CameraPlacement::Fitted(args.view),
         };
@@ -143,17 +147,16 @@ fn direction(side: Option<Side>) -> ViewDirection {
 
 /// Up direction of a picture along `sight`: the axes' up, or their forward direction if up is along the line of sight.
 fn upward(axes: Axes, sight: DVec3) -> DVec3 {
-    let (up, ahead) = match axes {
-        Axes::ZUp => (DVec3::Z, DVec3::Y),
-        Axes::YUp => (DVec3::Y, DVec3::NEG_Z),
-        Axes::Camera => (DVec3::NEG_Y, DVec3::Z),
-    };
-    if sight.cross(up).length() > 1e-6 * sight.length() { up } else { ahead }
+    let [_, front, up] = axes.frame();
+    if sight.cross(up).length() > 1e-6 * sight.length() { up } else { -front }
 }
 
-fn load(path: &Path) -> Result<Camera, Failure> {
+fn load(path: &Path, console: &Console) -> Result<Camera, Failure> {
     let shown = path.display();
-    let text = read_to_string(path).map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
+    let text = read_text(path).map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
+    if let Some(pinhole) = PinholeCamera::parse(&text) {
+        return of_pinhole(path, &pinhole, console);
+    }
     let camera: Camera = serde_json::from_str(&text).map_err(|error| {
         let why = match error.classify() {
             Category::Data => "eye, look_at and up must be three numbers each, projection as --save-camera writes it",
@@ -161,6 +164,35 @@ fn load(path: &Path) -> Result<Camera, Failure> {
         };
         Failure::usage(format!("{shown}, line {}, column {}: not a camera: {why}", error.line(), error.column()))
     })?;
+    camera.check().map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
+    Ok(camera)
+}
+
+/// Most that a principal point may lie beside the middle, as a part of the picture's width or height, and that pixels
+/// may differ from squares, without a note.
+const MAX_ASYMMETRY: f64 = 0.01;
+
+/// The view of a calibrated camera, whose field of view is kept from top to bottom.
+fn of_pinhole(path: &Path, pinhole: &PinholeCamera, console: &Console) -> Result<Camera, Failure> {
+    let shown = path.display();
+    let PinholeCamera { fx, fy, cx, cy, size, world_from_camera, cameras, .. } = *pinhole;
+    let Some(pose) = world_from_camera else {
+        let why = "a camera without a pose; Open3D writes one as 'extrinsic', and --eye with --fov states one";
+        return Err(Failure::usage(format!("{shown}: {why}")));
+    };
+    if cameras > 1 {
+        console.note(format_args!("{shown}: the first of {cameras} cameras is taken"));
+    }
+    let [width, height] = size.unwrap_or([2.0 * cx + 1.0, 2.0 * cy + 1.0]);
+    let aside = [(cx + 0.5) / width - 0.5, (cy + 0.5) / height - 0.5, fx / fy - 1.0];
+    if aside.into_iter().any(|part| part.abs() > MAX_ASYMMETRY) {
+        console.note(format_args!(
+            "{shown}: its axis is put in the middle of the picture, and its pixels are taken as square"
+        ));
+    }
+    let [eye, down, forward] = [pose.w_axis, pose.y_axis, pose.z_axis].map(|axis| axis.truncate());
+    let fov_deg = 2.0 * (0.5 * height / fy).atan().to_degrees();
+    let camera = Camera { eye, look_at: eye + forward, up: -down, projection: Projection::PerspectiveFovDeg(fov_deg) };
     camera.check().map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
     Ok(camera)
 }

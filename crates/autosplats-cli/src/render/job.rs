@@ -1,13 +1,14 @@
 //! The job of `render`: its flags combined and checked before any work.
 
 use std::collections::HashSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use autosplats::{
     BYTES_PER_PIXEL, Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Reconstruction, Renderer,
     Settings, Shading, still_supersample, usual_exposure,
 };
 use autosplats_cloud::{PointCloud, check_memory};
+use autosplats_output::PictureFormat;
 
 use super::camera::CameraJob;
 use super::film::FilmJob;
@@ -79,14 +80,23 @@ impl Job {
                 "--resume: with --frames-averaged a frame depends on earlier ones; render all frames again",
             ));
         }
+        let jpeg = |path: &Path| PictureFormat::of(path) == Some(PictureFormat::Jpeg);
+        let named = film.as_ref().map(FilmJob::first_file);
+        if look.background == Some(Background::Transparent)
+            && let Some(opaque) = pictures.iter().map(|picture| &picture.path).chain(&named).find(|path| jpeg(path))
+        {
+            return Err(Failure::usage(format!(
+                "--background transparent: {} cannot be transparent; write a .png",
+                opaque.display()
+            )));
+        }
         let settings = settings(&surface, look, needs_layers);
         settings.check()?;
 
         let save_camera = camera.save_camera.clone();
-        let inputs = Inputs::new(&inputs, &input)?;
-        let camera = CameraJob::new(&camera)?;
+        let inputs = Inputs::new(&inputs, &input)?.for_pictures();
+        let camera = CameraJob::new(&camera, console)?;
         let read_files = inputs.files(camera.file());
-        let named = film.as_ref().map(FilmJob::first_file);
         let targets = pictures.iter().map(|picture| &picture.path).chain(&named).chain(&save_camera);
         let mut seen = HashSet::new();
         for target in targets {
@@ -138,9 +148,11 @@ impl Job {
         cloud: &PointCloud,
         camera: &Camera,
     ) -> Result<(), Failure> {
+        let mut settings = self.settings_for(cloud);
         let size = self.rendered_size();
-        let Self { settings, first_radius, console, .. } = self;
-        settle_first_radius(settings, *first_radius, renderer, cloud, camera, size, console)
+        settle_first_radius(&mut settings, self.first_radius, renderer, cloud, camera, size, &self.console)?;
+        self.settings.reconstruction.engine = settings.reconstruction.engine;
+        Ok(())
     }
 
     /// Renders a cloud of any number of points, also none.
@@ -150,8 +162,8 @@ impl Job {
         cloud: &PointCloud,
         camera: &Camera,
     ) -> Result<Frame<'a>, Failure> {
-        let go_on = || !self.console.interrupt().requested();
-        Ok(renderer.render_while(cloud, camera, self.rendered_size(), &self.settings_for(cloud), &go_on)?)
+        let (size, settings) = (self.rendered_size(), self.settings_for(cloud));
+        Ok(renderer.render_while(cloud, camera, size, &settings, &self.console.goes_on())?)
     }
 
     /// Fixes what all pictures share, by the first of them.
@@ -162,12 +174,12 @@ impl Job {
         camera: &Camera,
     ) -> Result<(), Failure> {
         let mut settings = self.settings_for(cloud);
-        renderer.settle(&mut settings, cloud, camera, self.rendered_size())?;
+        renderer.settle(&mut settings, cloud, camera, self.rendered_size(), &self.console.goes_on())?;
         self.settings.shading = settings.shading;
         Ok(())
     }
 
-    /// The settings for a cloud of any number of points, also none.
+    /// The settings for a cloud of any number of points, also none. No point has more neighbours than there are others.
     fn settings_for(&self, cloud: &PointCloud) -> Settings {
         let mut settings = self.settings.clone();
         if cloud.is_empty() {
@@ -183,19 +195,20 @@ impl Job {
         self.settings.shading.background == Background::Transparent
     }
 
-    /// Lowers k to the number of neighbours in a small cloud and returns a note. Fails for a single point. With `auto`,
-    /// small clouds are dots.
-    pub(super) fn fit_neighbors(&mut self, cloud: &PointCloud) -> Result<Option<String>, Failure> {
-        let Reconstruction { k, adaptive, .. } = &mut self.settings.reconstruction;
-        match cloud.len() {
-            1.. if *adaptive => Ok(None),
-            0 | 1 => Err(Failure::new(Exit::Input, format!("{}: one point makes no surface", self.inputs.names()))),
-            points if points <= *k as usize => {
-                let wanted = std::mem::replace(k, points as u32 - 1);
-                Ok(Some(format!("{points} points cannot have {wanted} neighbours each; using {k}")))
-            }
-            _ => Ok(None),
+    /// Fails for a single point. With `auto`, small clouds are dots.
+    pub(super) fn check_count(&self, cloud: &PointCloud) -> Result<(), Failure> {
+        if cloud.len() > usize::from(!self.settings.reconstruction.adaptive) {
+            return Ok(());
         }
+        Err(Failure::new(Exit::Input, format!("{}: one point makes no surface", self.inputs.names())))
+    }
+
+    /// A note if a cloud has too few points for the asked number of neighbours. With `auto`, such clouds are dots.
+    pub(super) fn fewer_neighbors(&self, cloud: &PointCloud) -> Option<String> {
+        let Reconstruction { k: wanted, adaptive, .. } = self.settings.reconstruction;
+        let k = self.settings_for(cloud).reconstruction.k;
+        (k < wanted && !adaptive && !cloud.is_empty())
+            .then(|| format!("{} points cannot have {wanted} neighbours each; using {k}", cloud.len()))
     }
 
     /// Sets the exposure from these points if no flag states it, with a note if colours get brighter.

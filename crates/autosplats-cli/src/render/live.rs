@@ -11,7 +11,7 @@ use autosplats_sources::{Player, Statistics};
 use super::film::FilmJob;
 use super::job::Job;
 use super::pictures::{FrameReport, FrameTally, QueuedPicture, Writer};
-use super::placement::SharedPlacement;
+use super::placement::{MIN_POINTS, SharedPlacement};
 use super::{camera, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -36,6 +36,7 @@ pub(super) fn run(
         return Err(Failure::usage(format!("--resume: {name} is live, and its earlier frames do not come again")));
     }
     let bar = Bar::spinner("rendering live input", &job.console);
+    let notes = Notes::new(&bar, &job.inputs.names());
     let interrupt = job.console.interrupt().clone();
     let mut streams = Streams::new(playing, &bar, interrupt.clone())?;
     // Pictures rendered so far are kept, also as a film.
@@ -47,6 +48,8 @@ pub(super) fn run(
     let mut tally = FrameTally::default();
     let mut place = SharedPlacement::default();
     let (mut first_frame, mut frame): (Option<First>, usize) = (None, 0);
+    // Frames are counted from the first with points.
+    let (mut has_begun, mut without_points) = (false, 0);
     let writer = Writer::start(job, film, rate);
     let is_film = matches!(film.target, Target::Film(_));
     // The film shows the last picture until the next one comes, at a time that is still unknown.
@@ -55,9 +58,15 @@ pub(super) fn run(
         while !interrupt.ending() && film.frames.last.is_none_or(|last| frame <= last) {
             let waited = Instant::now();
             let Some(cloud) = streams.next(&mut place)? else { break };
-            if cloud.len() < 2 && first_frame.is_none() || frame < film.frames.first {
-                // There is nothing to place a camera for, or the frame is not requested.
-                frame += usize::from(frame < film.frames.first && !cloud.is_empty());
+            let placeable = first_frame.is_some() || cloud.has_finite(MIN_POINTS);
+            has_begun |= placeable;
+            if !has_begun {
+                without_points += 1;
+                continue;
+            }
+            if frame < film.frames.first || !placeable {
+                // The frame is not requested, or there is nothing to place a camera for.
+                frame += 1;
                 continue;
             }
             let read_ms = super::milliseconds_since(waited);
@@ -73,6 +82,7 @@ pub(super) fn run(
                 }
             };
             let seconds = first.seconds_until(frame);
+            job.fewer_neighbors(&cloud).iter().for_each(|note| notes.tell(note));
             let rendered = job.render(renderer, &place.upright(cloud), &first.camera)?;
             tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
@@ -101,6 +111,7 @@ pub(super) fn run(
     rendered.and(written)?;
     let Statistics { dropped, refused, last_refusal, waiting, .. } = streams.statistics();
     drop(streams);
+    drop(notes);
     drop(bar);
     if tally.written == 0 {
         if interrupt.ending() {
@@ -110,7 +121,9 @@ pub(super) fn run(
         return Err(Failure::new(Exit::Input, format!("{}: no points arrived{why}", job.inputs.names())));
     }
     let of = |count: u64, what: &str| if count > 0 { format!(", {count} {what}") } else { String::new() };
-    let more = of(dropped, "updates skipped for newer ones") + &of(refused, "refused");
+    let more = of(dropped, "updates skipped for newer ones")
+        + &of(refused, "refused")
+        + &of(without_points, "without points came first");
     tally.summarize(film, &more, begun, device, &job.console);
     Ok(())
 }

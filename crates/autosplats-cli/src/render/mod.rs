@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use autosplats::{Camera, Counts, Frame, Renderer};
 use autosplats_cloud::Axes;
-use autosplats_output::{write_exr, write_png};
+use autosplats_output::write_exr;
 
 pub(crate) use self::camera::scene_camera;
 use self::film::FilmJob;
@@ -44,7 +44,7 @@ pub(crate) fn run(args: RenderArgs, console: &Console) -> Result<(), Failure> {
     let read = milliseconds_since(started);
 
     job.check_color(&cloud)?;
-    let fewer = job.fit_neighbors(&cloud)?;
+    job.check_count(&cloud)?;
     let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
     let cloud = cloud.with_axes(axes);
 
@@ -54,7 +54,7 @@ pub(crate) fn run(args: RenderArgs, console: &Console) -> Result<(), Failure> {
     if degrees {
         notes.push("coordinates in degrees are shown in metres east, north and up of the points' middle".to_owned());
     }
-    notes.extend(fewer);
+    notes.extend(job.fewer_neighbors(&cloud));
     let placed = Placed { camera, axes, read, notes };
     let bar = Bar::spinner("rendering", console);
     match job.render(&mut renderer, &cloud, &camera) {
@@ -119,10 +119,10 @@ impl Placed {
 
 fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, job: &Job) -> Result<u64, Failure> {
     write_file(&picture.path, &job.console, |writer| match picture.format {
-        Format::Png if job.supersample > 1 => {
-            write_png(&frame.image.averaged(job.supersample), job.transparent(), writer)
+        Format::Picture(format) if job.supersample > 1 => {
+            autosplats_output::write_picture(&frame.image.averaged(job.supersample), format, job.transparent(), writer)
         }
-        Format::Png => write_png(frame.image, job.transparent(), writer),
+        Format::Picture(format) => autosplats_output::write_picture(frame.image, format, job.transparent(), writer),
         Format::Exr => write_exr(frame, camera, writer),
     })
 }

@@ -13,7 +13,7 @@ use autosplats_sources::Timeline;
 use super::film::FilmJob;
 use super::job::Job;
 use super::pictures::{FrameReport, FrameTally, QueuedPicture, Writer};
-use super::placement::SharedPlacement;
+use super::placement::{MIN_POINTS, SharedPlacement};
 use super::{camera, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -79,9 +79,7 @@ pub(super) fn run(
     let writer = Writer::start(job, film, rate);
     let mut render_all = || {
         for (number, &(frame, pictures)) in shown.iter().enumerate() {
-            if bar.cancelled() {
-                return Err(Failure::interrupted());
-            }
+            bar.tick(number as f32 / shown.len() as f32)?;
             let path = film.file(frame);
             if film.resume && path.as_ref().is_some_and(|path| path.exists()) {
                 tally.kept += 1;
@@ -90,6 +88,7 @@ pub(super) fn run(
             let started = Instant::now();
             let cloud = scene.frame(frame, &notes)?;
             let read_ms = super::milliseconds_since(started);
+            job.fewer_neighbors(&cloud).iter().for_each(|note| notes.tell(note));
             let rendered = job.render(renderer, &cloud, &camera)?;
             tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
@@ -100,7 +99,6 @@ pub(super) fn run(
                 return Ok(());
             }
             tally.written += pictures.unwrap_or(1);
-            bar.report((number + 1) as f32 / shown.len() as f32);
         }
         Ok(())
     };
@@ -160,9 +158,17 @@ impl Moving {
     /// Places the camera so that it sees all frames, and fixes the settings that depend on the points.
     fn settle(&mut self, job: &mut Job, renderer: &mut Renderer, frames: &Range<usize>) -> Result<Camera, Failure> {
         let bar = Bar::on_input("placing the camera", &self.names, &job.console);
-        let last = frames.len() - 1;
-        let count = frames.len().min(MAX_CAMERA_FRAMES);
-        let mut looks: Vec<usize> = (0..count).map(|look| frames.start + last * look / (count - 1).max(1)).collect();
+        // The first frame that has points is among them.
+        let mut start = frames.start;
+        for frame in frames.clone() {
+            if self.points(frame, &bar)?.has_finite(MIN_POINTS) {
+                start = frame;
+                break;
+            }
+        }
+        let last = frames.end - 1 - start;
+        let count = (last + 1).min(MAX_CAMERA_FRAMES);
+        let mut looks: Vec<usize> = (0..count).map(|look| start + last * look / (count - 1).max(1)).collect();
         looks.dedup();
         let mut clouds = Vec::new();
         for (number, frame) in looks.iter().enumerate() {
@@ -172,10 +178,11 @@ impl Moving {
         drop(bar);
         let parts: Vec<_> = clouds.iter().map(|cloud| (&**cloud, DMat4::IDENTITY)).collect();
         let all = PointCloud::merged(&parts);
-        if all.len() < 2 {
+        if !all.has_finite(MIN_POINTS) {
             return Err(Failure::new(Exit::Input, format!("{}: there are no points in these frames", self.names)));
         }
-        let first = clouds.into_iter().find(|cloud| cloud.len() > 1).unwrap_or_else(|| Arc::new(all.clone()));
+        let first =
+            clouds.into_iter().find(|cloud| cloud.has_finite(MIN_POINTS)).unwrap_or_else(|| Arc::new(all.clone()));
         self.place.settle(job, renderer, &all, first)
     }
 

@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use autosplats::{Counts, Frame, Image, Timings};
-use autosplats_output::{Film, Frames, Target, write_png};
+use autosplats_output::{Film, Frames, Target, write_picture};
 use serde::Serialize;
 
 use super::film::FilmJob;
@@ -120,7 +120,7 @@ fn write_frames(
     for QueuedPicture { image, report } in shots.iter().flatten() {
         let path = names.file(report.frame);
         style.inputs.check(&path)?;
-        write_file(&path, &style.console, |writer| write_png(&image, style.alpha, writer))?;
+        write_file(&path, &style.console, |writer| write_picture(&image, names.format(), style.alpha, writer))?;
         if style.json {
             style.console.print_json(&report)?;
         }
@@ -137,8 +137,7 @@ fn write_film(
     written: &Sender<Image>,
 ) -> Result<(), Failure> {
     let interrupt = style.console.interrupt();
-    let failure =
-        |error| if interrupt.requested() { Failure::interrupted() } else { Failure::new(Exit::Output, error) };
+    let failure = |error| Failure::new(Exit::Output, error);
     let mut reports = Vec::new();
     {
         // The lock makes Ctrl-C wait until the partial film is removed.

@@ -9,6 +9,9 @@ use autosplats_cloud::{Axes, LocalMetres, PointCloud};
 use super::job::Job;
 use crate::exit::Failure;
 
+/// Fewest finite points that a camera can be placed by.
+pub(super) const MIN_POINTS: usize = 2;
+
 /// Conversion to metres and up axis, fixed by the first points so that all pictures share them.
 #[derive(Default)]
 pub(super) struct SharedPlacement {
@@ -29,7 +32,7 @@ impl SharedPlacement {
             }
             None => Arc::default(),
         };
-        if self.metres.is_none() && !cloud.is_empty() {
+        if self.metres.is_none() && cloud.has_finite(1) {
             self.metres = cloud.local_metres(None);
         }
         if let Some(metres) = &self.metres {

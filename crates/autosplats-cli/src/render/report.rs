@@ -57,11 +57,7 @@ impl<'a> Report<'a> {
             supersample: job.supersample,
             counts: frame.counts,
             device,
-            axes: match axes {
-                Axes::ZUp => "z-up",
-                Axes::YUp => "y-up",
-                Axes::Camera => "camera",
-            },
+            axes: axes.name(),
             camera,
             outputs: written.into_iter().map(|(path, bytes)| Written { path, bytes }).collect(),
             timings_ms: PrintedTimings { read, stages: frame.timings, write },

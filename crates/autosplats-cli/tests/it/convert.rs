@@ -32,6 +32,17 @@ fn an_existing_file_is_kept_unless_forced() {
     assert_eq!(points(&folder.read("out.ply")), SPHERE_POINTS, "now it was");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_link_stays_one() {
+    let folder = Folder::with_sphere();
+    folder.write("old.ply", "old");
+    std::os::unix::fs::symlink("old.ply", folder.path("link.ply")).expect("a link can be made");
+    folder.succeed(&["convert", "sphere.ply", "link.ply", "--force"]);
+    assert!(folder.path("link.ply").is_symlink(), "the link is still one");
+    assert_eq!(points(&folder.read("old.ply")), SPHERE_POINTS, "and what it points to is new");
+}
+
 #[test]
 fn several_inputs_become_one_file() {
     let folder = Folder::with_sphere();

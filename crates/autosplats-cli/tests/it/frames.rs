@@ -55,6 +55,15 @@ fn frames_are_chosen_and_numbered_as_they_are() {
 }
 
 #[test]
+fn frames_of_few_points_have_fewer_neighbours() {
+    let folder = folder();
+    folder.write("sweep/scan_4.xyz", "0 0 0\n9 0 0\n0 9 0\n9 9 0");
+    let out = folder.succeed(&["render", "sweep", "--size", "120x90", "-k", "10", "-o", "f_%d.png"]);
+    let told: Vec<_> = out.stderr.lines().filter(|line| line.contains("neighbours")).collect();
+    assert!(told.len() == 1 && told[0].contains("4 points cannot have 10 neighbours each; using 3"), "{told:?}");
+}
+
+#[test]
 fn resume_skips_existing_pictures() {
     let folder = folder();
     folder.write("f_1.png", "kept");
@@ -85,6 +94,28 @@ fn a_folder_alone_is_its_first_frame() {
     assert!(out.stderr.contains("sweep: this is the first of 4 frames"), "which is said: {}", out.stderr);
     folder.succeed(&["render", "sweep/scan_0.xyz", "--size", "120x90", "--quiet", "-o", "file.png"]);
     assert_eq!(folder.read("first.png"), folder.read("file.png"), "the same as the file");
+}
+
+#[test]
+fn frames_without_points_come_before_the_first() {
+    let folder = folder();
+    for name in ["sweep/scan_0.xyz", "sweep/scan_1.xyz"] {
+        folder.write(name, "nan nan nan\nnan nan nan\n");
+    }
+    let out = folder.succeed(&["render", "sweep", "--size", "120x90", "-o", "first.png"]);
+    assert!(out.stderr.contains("sweep: this is frame 2 of 0 to 3, the first with points"), "{}", out.stderr);
+    folder.succeed(&["render", "sweep/scan_2.xyz", "--size", "120x90", "--quiet", "-o", "file.png"]);
+    assert_eq!(folder.read("first.png"), folder.read("file.png"), "the same as the file");
+    let out = folder.succeed(&["render", "sweep", "--size", "120x90", "-o", "f_%d.png"]);
+    assert!(out.stderr.contains("2 frames show nothing, the first is frame 0"), "{}", out.stderr);
+    let told = folder.succeed(&["info", "sweep"]).stdout;
+    assert!(told.contains("frame 2 of 0 to 3, the first with points") && told.contains("900"), "{told}");
+    let Some(field) = crate::common::data().map(|data| data.with_file_name("field")) else { return };
+    let bag = field.join("bag_b06_empty_then_full.bag").display().to_string();
+    let out = folder.succeed(&["convert", &bag, "bag.ply"]);
+    assert!(out.stderr.contains("this is frame 1 of 0 to 1, the first with points"), "{}", out.stderr);
+    let out = folder.succeed(&["render", &bag, "--frames", "0..", "--size", "120x90", "-o", "g_%d.jpg"]);
+    assert!(folder.path("g_1.jpg").exists() && out.stderr.contains("frame 0 shows nothing"), "{}", out.stderr);
 }
 
 #[test]

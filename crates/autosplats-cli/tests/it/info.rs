@@ -131,8 +131,9 @@ fn errors_of_one_file_are_one_line() {
 fn what_the_header_says_of_a_broken_file_is_shown() {
     let folder = Folder::new();
     let whole = crate::common::sphere_ply();
-    folder.write("half.ply", &whole[..whole.len() / 2]);
-    let outcome = folder.run(&["info", "half.ply"]);
+    let (first, rest) = whole.split_at(whole.len() / 2);
+    folder.write("broken.ply", &format!("{first}oops{rest}"));
+    let outcome = folder.run(&["info", "broken.ply"]);
     assert_eq!(outcome.code, Some(3), "{}", outcome.stderr);
     assert!(outcome.stdout.contains("6,000"), "what the header promises: {}", outcome.stdout);
     assert!(outcome.stdout.contains("could not be read"), "and that it is not kept: {}", outcome.stdout);

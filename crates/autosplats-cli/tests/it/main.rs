@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod bench_paper;
+mod choosing;
 mod common;
 mod convert;
 mod doctor;
@@ -16,4 +17,5 @@ mod normals;
 mod real_files;
 mod render;
 mod streams;
+mod texts;
 mod usage;

@@ -379,3 +379,42 @@ fn a_bench_tells_every_stage() {
     folder.fail(&["bench", "--scene", "cave"], 2, &["cathedral"]);
     folder.fail(&["bench", "--frames", "0"], 2, &["1 to 100000"]);
 }
+
+#[test]
+fn jpegs_and_named_backgrounds() {
+    let folder = Folder::with_sphere();
+    let white = ["--background", "white", "--quiet"];
+    render(&folder, &[&FRONT[..], &white, &["-o", "a.jpg", "-o", "b.JPEG", "-o", "c.png"]].concat());
+    assert_eq!(folder.read("a.jpg"), folder.read("b.JPEG"), "of either extension");
+    let [jpeg, png] = ["a.jpg", "c.png"].map(|name| image::open(folder.path(name)).expect("a picture").into_rgb8());
+    assert_eq!(png.get_pixel(0, 0).0, [255; 3], "white");
+    let off = jpeg.pixels().zip(png.pixels()).map(|(a, b)| a.0[0].abs_diff(b.0[0])).max();
+    assert!(off < Some(32), "the same picture but for {off:?}");
+    assert!(folder.read("a.jpg").len() < folder.read("c.png").len(), "and smaller");
+}
+
+#[test]
+fn cameras_of_open3d_see_what_they_state() {
+    let folder = Folder::with_sphere();
+    // The camera in front of the sphere: 4 units away along y, a field of view of 40 degrees.
+    let focal = 30.0 / 20.0_f64.to_radians().tan();
+    let extrinsic = "[1,0,0,0, 0,0,1,0, 0,-1,0,0, 0,0,4,1]";
+    let camera = |extra: &str, cx: f64| {
+        format!(
+            r#"{{{extra}"intrinsic": {{"width": 80, "height": 60, "intrinsic_matrix": [{focal},0,0,0,{focal},0,{cx},29.5,1]}}}}"#
+        )
+    };
+    let posed = |cx| camera(&format!(r#""class_name": "PinholeCameraParameters", "extrinsic": {extrinsic}, "#), cx);
+    folder.write("open3d.json", &posed(39.5));
+    folder.write("aside.json", &posed(50.0));
+    folder.write("unposed.json", &camera("", 39.5));
+    let (size, quiet) = (["--size", "80x60"], "--quiet");
+    folder.succeed(&[&["render", "sphere.ply", "-o", "a.png", quiet], &FRONT[..], &size].concat());
+    folder.succeed(&[&["render", "sphere.ply", "-o", "b.png", "--camera", "open3d.json", quiet], &size[..]].concat());
+    let [a, b] = ["a.png", "b.png"].map(|name| image::open(folder.path(name)).expect("a picture").into_rgb8());
+    let off = a.pixels().zip(b.pixels()).filter(|(a, b)| a.0[0].abs_diff(b.0[0]) > 8).count();
+    assert!(off < 20, "{off} pixels differ");
+    let out = folder.succeed(&[&["render", "sphere.ply", "-o", "b.png", "--camera", "aside.json"], &size[..]].concat());
+    assert!(out.stderr.contains("aside.json: its axis is put in the middle"), "{}", out.stderr);
+    folder.fail(&["render", "sphere.ply", "-o", "c.png", "--camera", "unposed.json"], 2, &["without a pose", "--eye"]);
+}

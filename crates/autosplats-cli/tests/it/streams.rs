@@ -189,6 +189,46 @@ fn a_folder_that_is_watched_has_a_picture_of_each_new_file() {
     folder.fail(&["render", "scene:statue:1K", "--watch", "-o", "f_%d.png"], 2, &["--watch", "scene:statue:1K"]);
 }
 
+/// A frame of a depth camera that sees nothing yet.
+fn blind() -> String {
+    points_ply(&["nan nan nan"; 5])
+}
+
+#[test]
+fn first_frames_without_points_are_waited_out() {
+    let folder = Folder::new();
+    for (kinds, words) in [
+        (vec![blind(), sheet(0)], "1 picture, 1 without points came first;"),
+        (vec![points_ply(&[]), blind(), sheet(0), blind(), sheet(1)], "3 pictures, 2 without points came first;"),
+    ] {
+        let mut child = start(&folder, &["-", "-o", "f_%d.png"]);
+        let mut pipe = input(&mut child);
+        kinds.iter().for_each(|file| pipe.write_all(file.as_bytes()).expect("it reads"));
+        drop(pipe);
+        let (code, _, stderr) = end(child);
+        assert!(code == Some(0) && stderr.contains(words), "{stderr}");
+    }
+    let mut child = start(&folder, &["-", "-o", "still.png"]);
+    input(&mut child).write_all((blind() + &sheet(0)).as_bytes()).expect("it reads");
+    let (code, _, stderr) = end(child);
+    assert_eq!(code, Some(0), "a still takes the first frame with points: {stderr}");
+    let mut child = start(&folder, &["-", "-o", "none.png"]);
+    input(&mut child).write_all(blind().as_bytes()).expect("it reads");
+    let (code, _, stderr) = end(child);
+    assert!(code == Some(3) && stderr.contains("error: -: "), "there are none: {stderr}");
+}
+
+#[test]
+fn a_watched_file_without_points_is_waited_for() {
+    let folder = Folder::new();
+    folder.write("a.ply", &blind());
+    let child = start(&folder, &["a.ply", "--watch", "--frames", "0", "-o", "f_%d.png"]);
+    std::thread::sleep(Duration::from_millis(500));
+    folder.write("a.ply", &sheet(0));
+    let (code, _, stderr) = end(child);
+    assert_eq!((code, folder.path("f_0.png").exists()), (Some(0), true), "{stderr}");
+}
+
 #[test]
 fn streams_that_show_nothing_say_so() {
     let folder = Folder::new();

@@ -24,7 +24,7 @@ fn options_that_do_not_fit() {
         (&["--supersample", "0"], &["1..=8"]),
         (&["--supersample", "2", "-o", "layers.exr"], &["--supersample", ".exr"]),
         (&["--range", "2..1"], &["lower"]),
-        (&["--background", "red"], &["#rrggbb"]),
+        (&["--background", "redd"], &["#rrggbb", "white"]),
         (&["--color-map", "jet"], &["viridis"]),
         (&["--view", "sideways"], &["iso", "top"]),
         (&["--eye", "1,2"], &["three numbers"]),
@@ -48,8 +48,9 @@ fn options_that_do_not_fit() {
         (&["--color", "Red"], &["--color rgb"]),
         (&["--color", "classification"], &["no field Classification"]),
         (&["-o", "out.png"], &["two outputs"]),
-        (&["-o", "out.jpg"], &[".png or .exr"]),
-        (&["-o", "out"], &[".png or .exr"]),
+        (&["-o", "out.gif"], &[".png, .jpg or .exr"]),
+        (&["-o", "out"], &[".png, .jpg or .exr"]),
+        (&["-o", "out.jpg", "--background", "transparent"], &["out.jpg", ".png"]),
     ];
     for (options, words) in cases {
         folder.fail(&[&RENDER[..], options].concat(), 2, words);

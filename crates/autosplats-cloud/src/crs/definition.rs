@@ -1,7 +1,5 @@
 //! What a coordinate system is.
 
-use super::wkt;
-
 /// The coordinate system that a file states. Readers do not convert coordinates.
 ///
 /// # Examples
@@ -35,24 +33,6 @@ impl Crs {
     pub fn height_scale(&self) -> Option<f64> {
         let (across, upward) = (self.unit?.metres()?, self.vertical_unit?.metres()?);
         (across != upward).then(|| upward / across)
-    }
-
-    /// The system of x and y alone, without what it states of heights. A definition of which the heights cannot be
-    /// taken away is dropped.
-    #[must_use]
-    pub fn horizontal(self) -> Self {
-        let geotiff = self.geotiff.map(GeoKeys::without_heights);
-        let Some(wkt) = self.wkt else { return Self { vertical_unit: None, geotiff, ..self } };
-        match wkt::horizontal(&wkt) {
-            Some(part) if part == wkt => Self { vertical_unit: None, wkt: Some(wkt), geotiff, ..self },
-            Some(part) => {
-                let keys = || geotiff.as_ref().and_then(|keys| keys.read().crs.epsg);
-                let Self { name, epsg, .. } = Self::from_wkt(part);
-                let epsg = epsg.or_else(keys);
-                Self { name, epsg, wkt: Some(part.to_owned()), unit: self.unit, vertical_unit: None, geotiff }
-            }
-            None => Self { unit: self.unit, geotiff, ..Self::default() },
-        }
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! The text is a tree: a keyword with values in brackets, some of which are keywords with values again.
 
-use super::definition::{Crs, CrsDefinition, Unit};
+use super::definition::{Crs, CrsDefinition, GeoKeys, Unit};
 
 /// Largest depth of brackets; deeper text is not parsed.
 const MAX_DEPTH: usize = 32;
@@ -10,6 +10,24 @@ const MAX_DEPTH: usize = 32;
 const MAX_LEN: usize = 1 << 20;
 
 impl Crs {
+    /// The system of x and y alone, without what it states of heights. A definition of which the heights cannot be
+    /// taken away is dropped.
+    #[must_use]
+    pub fn horizontal(self) -> Self {
+        let geotiff = self.geotiff.map(GeoKeys::without_heights);
+        let Some(wkt) = self.wkt else { return Self { vertical_unit: None, geotiff, ..self } };
+        match horizontal(&wkt) {
+            Some(part) if part == wkt => Self { vertical_unit: None, wkt: Some(wkt), geotiff, ..self },
+            Some(part) => {
+                let keys = || geotiff.as_ref().and_then(|keys| keys.read().crs.epsg);
+                let Self { name, epsg, .. } = Self::from_wkt(part);
+                let epsg = epsg.or_else(keys);
+                Self { name, epsg, wkt: Some(part.to_owned()), unit: self.unit, vertical_unit: None, geotiff }
+            }
+            None => Self { unit: self.unit, geotiff, ..Self::default() },
+        }
+    }
+
     /// Parses well-known text of version 1 or 2. Text that cannot be parsed is kept in `wkt`.
     pub fn from_wkt(text: &str) -> Self {
         CrsDefinition::from_wkt(text).crs
@@ -152,7 +170,7 @@ fn system(node: &Node<'_>, found: &mut CrsDefinition) {
 }
 
 /// The part of the text that describes x and y; `None` if no part does so without heights.
-pub(super) fn horizontal(text: &str) -> Option<&str> {
+fn horizontal(text: &str) -> Option<&str> {
     let (mut node, _) = parse(text)?;
     while node.is(AROUND) || node.is(COMPOUND) {
         let children = node.values.into_iter().filter_map(|value| match value {

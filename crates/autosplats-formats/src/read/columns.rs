@@ -2,14 +2,26 @@
 
 use autosplats_cloud::{Error, excerpt};
 
-use super::Job;
+use super::{Attribute, Job, names};
 
 /// Largest number of values of a point; a header with more is broken.
 pub const MAX_COLUMNS: usize = 1024;
 
-/// The names that the caller gives to the columns; `None` for a column to leave out.
-pub(super) fn given(job: &Job<'_>) -> Result<Option<Vec<Option<String>>>, Error> {
+/// The names that the caller gives to the columns.
+pub(super) struct Given {
+    /// `None` for a column to leave out.
+    pub(super) names: Vec<Option<String>>,
+    /// Whether more columns may follow, which are left out.
+    pub(super) open: bool,
+}
+
+/// The names that the caller gives to the columns, if any. `...` at the end leaves out whatever follows.
+pub(super) fn given(job: &Job<'_>) -> Result<Option<Given>, Error> {
     let Some(names) = &job.options.columns else { return Ok(None) };
+    let (names, open) = match names.split_last() {
+        Some((last, names)) if last == "..." || last == "…" => (names, true),
+        _ => (&names[..], false),
+    };
     if names.len() > MAX_COLUMNS {
         return Err(job.unsupported(format!("--columns names {} columns; at most {MAX_COLUMNS}", names.len())));
     }
@@ -22,7 +34,7 @@ pub(super) fn given(job: &Job<'_>) -> Result<Option<Vec<Option<String>>>, Error>
         }
     }
     let name = |name: &String| (name != "-" && name != "_").then(|| name.clone());
-    Ok(Some(names.iter().map(name).collect()))
+    Ok(Some(Given { names: names.iter().map(name).collect(), open }))
 }
 
 /// Largest number of columns that a note lists.
@@ -42,122 +54,119 @@ pub(super) fn taken_for(names: &[Option<String>]) -> String {
     )
 }
 
-/// Names of x, y and z, the likeliest first.
-const AXES: [&[&str]; 3] = [
-    &[
-        "x",
-        "xcoord",
-        "xcoordinate",
-        "coordx",
-        "posx",
-        "positionx",
-        "px",
-        "points0",
-        "easting",
-        "east",
-        "e",
-        "longitude",
-        "lon",
-        "long",
-        "lng",
-    ],
-    &[
-        "y",
-        "ycoord",
-        "ycoordinate",
-        "coordy",
-        "posy",
-        "positiony",
-        "py",
-        "points1",
-        "northing",
-        "north",
-        "n",
-        "latitude",
-        "lat",
-    ],
-    &[
-        "z",
-        "zcoord",
-        "zcoordinate",
-        "coordz",
-        "posz",
-        "positionz",
-        "pz",
-        "points2",
-        "elevation",
-        "elev",
-        "height",
-        "altitude",
-        "alt",
-        "h",
-    ],
-];
+/// Columns that names state as x, y and z. The place of each axis is `None` if no name stands for it.
+pub(super) fn axes(names: &[String]) -> [Option<usize>; 3] {
+    let known: Vec<Option<(usize, usize)>> = names.iter().map(|name| names::axis(&names::plain(name))).collect();
+    let exact = |axis: usize| {
+        let of_axis =
+            known.iter().enumerate().filter_map(|(index, known)| Some((known.filter(|k| k.0 == axis)?.1, index)));
+        of_axis.min_by_key(|&(place, index)| (place, index)).map(|(_, index)| index)
+    };
+    let found = [0, 1, 2].map(exact);
+    if found.iter().all(Option::is_some) {
+        return found;
+    }
+    let compounds: Vec<Option<(usize, String)>> = names.iter().map(|name| compound(name)).collect();
+    // The axes of one position share the words around them.
+    let beside = |axis: usize, qualifier: &str| {
+        compounds.iter().position(|found| found.as_ref().is_some_and(|(a, q)| *a == axis && q == qualifier))
+    };
+    let third = |axis: usize, qualifier: &str| {
+        let mut others = compounds.iter().enumerate().filter(|(_, found)| found.as_ref().is_some_and(|f| f.0 == axis));
+        let only = others.next().filter(|_| others.next().is_none()).map(|(index, _)| index);
+        found[axis].or_else(|| beside(axis, qualifier)).or(only)
+    };
+    match found {
+        [Some(x), Some(y), None] => {
+            let up = (names::plain(&names[x]) == "e").then(|| names.iter().position(|name| names::plain(name) == "u"));
+            [Some(x), Some(y), up.flatten().or_else(|| third(2, ""))]
+        }
+        [None, Some(_), Some(_)] | [Some(_), None, Some(_)] => found,
+        _ => {
+            let pairs = compounds.iter().flatten().filter_map(|(_, q)| Some((beside(0, q)?, beside(1, q)?, q)));
+            let mut pairs = pairs.map(|(x, y, q)| [Some(x), Some(y), third(2, q)]);
+            pairs.clone().find(|pair| pair[2].is_some()).or_else(|| pairs.next()).unwrap_or(found)
+        }
+    }
+}
 
-/// A name for comparison: lower case, letters and digits only.
-pub(super) fn plain(name: &str) -> String {
-    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+/// The axis in a name of several words, and the other words: 0 and `centroid` of `LONGITUDE_CENTROID`. A direction
+/// counts more than a letter: `Northing_X` is y. Words such as `normal` make it something other than a position.
+fn compound(name: &str) -> Option<(usize, String)> {
+    let words = names::words(name);
+    let is_axis = |least: usize| {
+        let axis = |word: &String| names::axis(word).filter(|_| word.chars().count() >= least || !word.is_ascii());
+        words.iter().position(|word| axis(word).is_some())
+    };
+    let letter = || words.iter().position(|word| ["x", "y", "z"].contains(&&**word));
+    let at = is_axis(3).or_else(letter)?;
+    let (axis, _) = names::axis(&words[at])?;
+    let mut others: Vec<&str> = words.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, word)| &**word).collect();
+    if others.iter().any(|word| names::contains(names::NO_POSITION, word)) {
+        return None;
+    }
+    others.retain(|word| !["x", "y", "z"].contains(word));
+    Some((axis, others.join(" ")))
 }
 
 /// Indices of x, y and z among the names, if all are there.
 pub(super) fn find_axes(names: &[String]) -> Option<[usize; 3]> {
-    let plain: Vec<String> = names.iter().map(|name| plain(name)).collect();
-    let find = |axis: &[&str]| axis.iter().find_map(|name| plain.iter().position(|found| found == name));
-    Some([find(AXES[0])?, find(AXES[1])?, find(AXES[2])?])
+    let [x, y, z] = axes(names);
+    Some([x?, y?, z?])
 }
 
 /// Whether a name is one of longitude.
 pub(super) fn is_longitude(name: &str) -> bool {
-    ["longitude", "lon", "long", "lng"].contains(&&*plain(name))
+    is_degrees(names::LONGITUDES, name)
 }
 
 /// Whether a name is one of latitude.
 pub(super) fn is_latitude(name: &str) -> bool {
-    ["latitude", "lat"].contains(&&*plain(name))
+    is_degrees(names::LATITUDES, name)
 }
 
-/// Names of the three channels of a colour. If a file has several colours, the first in this list is taken.
-const COLORS: [[&str; 3]; 5] = [
-    ["red", "green", "blue"],
-    ["diffusered", "diffusegreen", "diffuseblue"],
-    ["r", "g", "b"],
-    ["colorred", "colorgreen", "colorblue"],
-    ["rf", "gf", "bf"],
-];
+/// Whether a name, or a word of it, is in a list of longitudes or latitudes.
+fn is_degrees(list: &str, name: &str) -> bool {
+    names::contains(list, &names::plain(name))
+        || names::words(name).iter().any(|word| word.len() > 2 && names::contains(list, word))
+}
+
+/// Whether a name is one of a colour or of a known attribute, which is no coordinate.
+pub(super) fn is_known(name: &str) -> bool {
+    let plain = names::plain(name);
+    names::field(&plain).is_some() || names::COLORS.iter().any(|channels| names::contains(channels, &plain))
+}
+
+/// Suffix of a name that comes again though it has a meaning, as `x`.
+pub(super) const AGAIN: &str = "_2";
+
+/// Attributes whose names differ: a suffix is added to each that comes again, as to the fields of a cloud.
+pub(super) fn unrepeated(attributes: impl Iterator<Item = Attribute>) -> Vec<Attribute> {
+    let mut all: Vec<Attribute> = Vec::new();
+    for mut attribute in attributes.take(MAX_COLUMNS) {
+        while all.iter().any(|other| other.name.eq_ignore_ascii_case(&attribute.name)) {
+            attribute.name.push_str(AGAIN);
+        }
+        all.push(attribute);
+    }
+    all
+}
 
 /// Indices of red, green and blue among the names, if all are there.
 pub(super) fn find_color(names: &[String]) -> Option<[usize; 3]> {
-    let plain: Vec<String> = names.iter().map(|name| plain(name)).collect();
+    let plain: Vec<String> = names.iter().map(|name| names::plain(name)).collect();
     let find = |name: &str| plain.iter().position(|found| found == name);
-    COLORS.iter().find_map(|[red, green, blue]| Some([find(red)?, find(green)?, find(blue)?]))
+    names::COLORS.iter().find_map(|channels| {
+        let mut channels = channels.split_ascii_whitespace();
+        Some([find(channels.next()?)?, find(channels.next()?)?, find(channels.next()?)?])
+    })
 }
 
 /// PDAL's name of a field, if the field is known to PDAL; otherwise `name`.
 pub(super) fn field_name(name: &str) -> String {
-    let plain = plain(name);
+    let plain = names::plain(name);
     // CloudCompare prefixes the fields of a PLY with `scalar`.
-    let known = match plain.strip_prefix("scalar").unwrap_or(&plain) {
-        "intensity" | "i" => "Intensity",
-        "classification" | "class" => "Classification",
-        "returnnumber" => "ReturnNumber",
-        "numberofreturns" => "NumberOfReturns",
-        "scandirectionflag" => "ScanDirectionFlag",
-        "edgeofflightline" => "EdgeOfFlightLine",
-        "scananglerank" => "ScanAngleRank",
-        "scanchannel" => "ScanChannel",
-        "userdata" => "UserData",
-        "pointsourceid" => "PointSourceId",
-        "gpstime" => "GpsTime",
-        "infrared" | "nir" => "Infrared",
-        "alpha" | "a" => "Alpha",
-        "nx" | "normalx" => "NormalX",
-        "ny" | "normaly" => "NormalY",
-        "nz" | "normalz" => "NormalZ",
-        "curvature" => "Curvature",
-        "ring" => "Ring",
-        _ => name,
-    };
-    known.into()
+    names::field(plain.strip_prefix("scalar").unwrap_or(&plain)).unwrap_or(name).into()
 }
 
 /// Largest number of values per point for which each becomes a field of its own. Descriptors have more.

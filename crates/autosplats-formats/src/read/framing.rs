@@ -27,6 +27,9 @@ const MARKS: &[&[u8]] = &[
 /// Beginnings of files that are accepted directly after a file.
 const BEGINNINGS: &[&[u8]] = &[b"ply\n", b"ply\r", b"ply ", b"#", b"VERSION ", b"FIELDS ", b"COLUMNS "];
 
+/// Skipped before a file; programs write it before text.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 enum State {
     /// A file may begin here.
     Between,
@@ -81,6 +84,10 @@ impl Framing {
                     let blank = |byte: &u8| byte.is_ascii_whitespace() || (filled && *byte == 0);
                     let start = self.bytes.iter().position(|byte| !blank(byte)).unwrap_or(self.bytes.len());
                     self.skip(start);
+                    if begins(&self.bytes, &[BYTE_ORDER_MARK])? {
+                        self.skip(BYTE_ORDER_MARK.len());
+                        continue;
+                    }
                     match begins(&self.bytes, BEGINNINGS)? {
                         true => self.state = State::Header { line: 0, looked: 0 },
                         false => {

@@ -46,6 +46,22 @@ impl Job<'_> {
         self.progress.note(&one_line(note.as_ref()));
     }
 
+    /// Tells that the file ends after `held` of `claimed` points, if it does.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] if it holds none of them.
+    pub(super) fn tell_cut_off(&self, held: usize, claimed: usize, what: &str) -> Result<(), Error> {
+        if held == 0 && claimed > 0 {
+            let what = format!("the file ends before the first of {claimed} {what}; it is cut off, copy it again");
+            return Err(self.malformed(format!("byte {}", self.bytes.len()), what));
+        }
+        if held < claimed {
+            let lost = claimed - held;
+            self.note(format!("the file is cut off: {lost} of {claimed} {what} are lost; copy it again"));
+        }
+        Ok(())
+    }
+
     /// Fails if the caller cancels; reports no progress.
     pub(super) fn go_on(&self) -> Result<(), Error> {
         if self.progress.cancelled() { Err(Error::Cancelled) } else { Ok(()) }

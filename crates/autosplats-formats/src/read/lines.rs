@@ -51,7 +51,7 @@ pub(super) fn lines<'a>(text: &'a [u8], range: &Range<usize>) -> impl Iterator<I
             let start = at;
             let line_end = text::line_end(&text[..end], at);
             at = line_end + 1;
-            let line = text[start..line_end].trim_ascii();
+            let line = text::trim(&text[start..line_end]);
             if !text::is_blank(line) {
                 return Some((start, line));
             }

@@ -11,16 +11,19 @@
 //! A file is not trusted: the claims of its header are checked against its size before anything is allocated.
 
 mod body;
+mod choose;
 mod columns;
 mod depth_image;
 mod describe;
 mod e57;
 pub mod framing;
 mod gltf;
+mod grid;
 mod job;
 mod las;
 mod lines;
 mod mesh;
+mod names;
 mod obj;
 mod off;
 mod options;
@@ -35,15 +38,16 @@ mod stl;
 pub mod table;
 mod text;
 mod units;
+mod unpack;
 mod xyz;
 
 use self::job::{Format, Job, MAX_HEADER_LINE};
 pub use self::{
     depth_image::color::beside as colors_beside,
     describe::{Attribute, Description},
-    options::{DepthCamera, ReadOptions},
+    options::ReadOptions,
     registry::{
-        check_not_lfs_pointer, describe, describe_bytes, formats, gltf_animation, read, read_bytes, read_gltf_at,
-        read_mesh, read_mesh_bytes, read_with,
+        check_not_lfs_pointer, describe, describe_bytes, formats, gltf_animation, is_named_as_points, read, read_bytes,
+        read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with,
     },
 };

@@ -11,14 +11,15 @@ use super::{
     table::{ProgressRange, reserve},
     text,
 };
+use crate::color_scale::ColorScale;
 
 pub(super) const FORMAT: Format =
     Format { name: "OBJ", extensions: &["obj"], recognised: |_| false, sensor_frame: false, describe, read };
 
 const PARSING: ProgressRange = ProgressRange { start: 0.0, len: 0.8 };
 
-/// Colour of vertices without a colour, if others have one.
-const WHITE: [f32; 3] = [1.0; 3];
+/// Mark of a vertex without a colour, which becomes white if others have one.
+const WHITE: [f32; 4] = [f32::NAN; 4];
 
 /// Largest file, in bytes, that a description counts through; counting then takes milliseconds.
 const MAX_COUNTED_BYTES: usize = 4 << 20;
@@ -80,8 +81,14 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         if mesh.uncolored > 0 {
             job.note(format!("{} vertices have no colour, while others do; taken for white", mesh.uncolored));
         }
-        let scale = if mesh.colors.as_flattened().iter().any(|&value| value > 1.0) { 255.0 } else { 1.0 };
-        cloud = mesh::with_colors(job, cloud, |i| mesh.colors[i].map(|value| value / scale))?;
+        let color = |i: usize| match mesh.colors[i] {
+            [_, red, green, blue] if !mesh.unweighted && !blue.is_nan() => [red, green, blue],
+            [red, green, blue, _] => [red, green, blue],
+        };
+        let scale = ColorScale::of(mesh.colors.len(), true, |i| color(i).map(f64::from));
+        scale.note().iter().for_each(|note| job.note(note));
+        let part = |value: f32| if value.is_nan() { 1.0 } else { value / scale.full() as f32 };
+        cloud = mesh::with_colors(job, cloud, |i| color(i).map(part))?;
     }
     // Faces that precede their vertices.
     faces.set_points(mesh.positions.len());
@@ -97,9 +104,11 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
 #[derive(Default)]
 struct Mesh {
     positions: Vec<[f64; 3]>,
-    /// One per vertex, or empty.
-    colors: Vec<[f32; 3]>,
+    /// Numbers of a colour, one per vertex, or empty.
+    colors: Vec<[f32; 4]>,
     uncolored: usize,
+    /// Whether the fourth number of a vertex of seven is a colour, not a weight of 1.
+    unweighted: bool,
     curves: usize,
     /// Corners of the faces that precede their vertices, and the end of each such face among them.
     corners: Vec<i64>,
@@ -117,6 +126,7 @@ impl Mesh {
         self.positions.extend_from_slice(&piece.positions);
         self.curves += piece.curves;
         self.uncolored += piece.uncolored;
+        self.unweighted |= piece.unweighted;
         if !(self.colors.is_empty() && piece.colors.is_empty()) {
             let missing = known - self.colors.len();
             reserve(&mut self.colors, missing, "the colours of an OBJ file")?;
@@ -157,9 +167,10 @@ fn resolve(corner: i64, before: usize) -> i64 {
 #[derive(Default)]
 struct Piece {
     positions: Vec<[f64; 3]>,
-    /// One per vertex, up to the last vertex that has a colour.
-    colors: Vec<[f32; 3]>,
+    /// Numbers of a colour, one per vertex, up to the last vertex that has a colour.
+    colors: Vec<[f32; 4]>,
     uncolored: usize,
+    unweighted: bool,
     curves: usize,
     corners: Vec<i64>,
     /// End of each face among the corners.
@@ -221,15 +232,11 @@ impl Piece {
         if len < 3 {
             return Err(format!("{len} values where a vertex has x, y and z; complete or remove the line"));
         }
-        // The fourth of four or seven numbers is a weight, which only curves use.
-        let color = match len {
-            6 => Some([a, b, c]),
-            7 => Some([b, c, d]),
-            _ => None,
-        };
-        if let Some(color) = color {
+        // The fourth of four numbers is a weight, which only curves use; of seven it is one if all are 1.
+        if matches!(len, 6 | 7) {
             self.colors.resize(self.positions.len(), WHITE);
-            self.colors.push(color.map(|value| value as f32));
+            self.colors.push([a, b, c, if len == 7 { d } else { f64::NAN }].map(|value| value as f32));
+            self.unweighted |= len == 7 && a != 1.0;
         } else {
             self.uncolored += 1;
         }

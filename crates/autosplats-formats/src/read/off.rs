@@ -26,9 +26,6 @@ pub(super) const FORMAT: Format = Format {
 
 const PARSING: ProgressRange = ProgressRange { start: 0.0, len: 0.8 };
 
-/// Rows sampled to find out what the numbers are.
-const SAMPLED_ROWS: usize = 1000;
-
 /// What a vertex has besides its position, according to the first word of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Kind {
@@ -128,12 +125,12 @@ impl Header {
         Err(job.malformed(job.line(job.bytes.len()), "the file ends before the counts of vertices and faces"))
     }
 
-    /// Meaning of the numbers of a vertex, by the file's first word and the first rows.
+    /// Meaning of the numbers of a vertex, by the file's first word and the first row.
     fn tokens(&self, job: &Job<'_>) -> Result<Vec<(&'static str, Token)>, Error> {
         let rest = self.end..job.bytes.len();
         let mut tokens = ["x", "y", "z"].map(|axis| (axis, Token::Store(Scalar::F64))).to_vec();
-        let mut rows = lines::lines(job.bytes, &rest).take(self.vertices.min(SAMPLED_ROWS)).peekable();
-        let Some(&(at, first)) = rows.peek() else { return Ok(tokens) };
+        let first = lines::lines(job.bytes, &rest).next().filter(|_| self.vertices > 0);
+        let Some((at, first)) = first else { return Ok(tokens) };
         let width = text::values(first).count();
         let Kind { texture, color, normal, .. } = self.kind;
         let (normals, textures) = (if normal { 3 } else { 0 }, if texture { 2 } else { 0 });
@@ -146,16 +143,7 @@ impl Header {
         }
         // Many files have colours that their first word does not announce.
         if matches!(others, 3 | 4) && (color || !texture) {
-            let first = 3 + normals;
-            let mut scalar = Scalar::U8;
-            for value in rows.flat_map(|(_, row)| text::values(row).skip(first).take(3)) {
-                if value.iter().any(|byte| matches!(byte, b'.' | b'e' | b'E')) {
-                    scalar = Scalar::F32;
-                } else if scalar == Scalar::U8 && text::number(value).is_ok_and(|value| value > 255.0) {
-                    scalar = Scalar::U16;
-                }
-            }
-            tokens.extend(["red", "green", "blue"].map(|channel| (channel, Token::Store(scalar))));
+            tokens.extend(["red", "green", "blue"].map(|channel| (channel, Token::Store(Scalar::F32))));
         }
         if self.kind.color && others == 0 {
             return Err(
@@ -200,7 +188,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
 
 fn read_rows(job: &Job<'_>, header: &Header) -> Result<Contents, Error> {
     let (names, tokens): (Vec<_>, Vec<_>) = header.tokens(job)?.into_iter().unzip();
-    let rows = Rows { tokens: &tokens, count: Some(header.vertices), counts_between: false };
+    let rows = Rows { tokens: &tokens, count: Some(header.vertices), may_be_cut: false };
     let stride = tokens.iter().map(|token| token.size()).sum();
     let mut offset = 0;
     let mut columns = Vec::new();

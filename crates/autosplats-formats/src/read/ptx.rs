@@ -10,11 +10,12 @@ use glam::{DMat3, DMat4, DVec3, DVec4};
 use rayon::prelude::*;
 
 use super::{
-    Attribute, Description, Format, Job,
+    Attribute, Description, Format, Job, lines,
     placed::{fill, place},
     table::{ProgressRange, Scalar},
-    text::{self, Rows, Token},
+    text::{self, Rows, Short, Token},
 };
+use crate::color_scale::{ColorScale, Levels};
 
 /// Fraction of the work that parsing takes.
 const PARSING: f32 = 0.8;
@@ -27,6 +28,12 @@ const MIN_LINE: usize = 6;
 
 /// Largest file, in bytes, of which all scans are described; of larger files only the first.
 const MAX_WALKED_BYTES: usize = 1 << 24;
+
+/// Lines of a scan whose numbers of values are counted before they are parsed.
+const SAMPLED_LINES: usize = 1000;
+
+/// Brightness of points without a colour, if others have one.
+const GREY: u8 = 200;
 
 /// Points of a preview chunk.
 const CHUNK: usize = 1 << 20;
@@ -47,11 +54,13 @@ struct Header {
     /// Maps the numbers of the file to world coordinates; may scale.
     world_from_local: DMat4,
     world_from_sensor: DMat4,
+    /// Whether the matrix was written for column vectors.
+    transposed: bool,
     /// First byte of the first point.
     start: usize,
 }
 
-/// A scan found in the file: its header, the byte range of its points, and the number of values per line.
+/// A scan found in the file: its header, the byte range of its points, and the largest number of values per line.
 struct FoundScan {
     header: Header,
     count: usize,
@@ -91,6 +100,7 @@ fn header(bytes: &[u8], mut at: usize) -> Result<Header, (usize, String)> {
         }
         at = text::after_line_end(bytes, at);
     }
+    let transposed = transpose(&mut values).map_err(|what| (at, what))?;
     let vector = |line: usize| DVec3::new(values[line][0], values[line][1], values[line][2]);
     // The file multiplies row vectors from the left, so its rows are the columns here.
     let column = |line: usize, last: f64| DVec4::from((vector(line), last));
@@ -100,7 +110,26 @@ fn header(bytes: &[u8], mut at: usize) -> Result<Header, (usize, String)> {
     // scanner's position in the other lines.
     let sensor = if world_from_local == DMat4::IDENTITY { placed } else { world_from_local };
     let whole = |line: usize| values[line][0] as u64;
-    Ok(Header { columns: whole(0), rows: whole(1), world_from_local, world_from_sensor: rigid(sensor), start: at })
+    let world_from_sensor = rigid(sensor);
+    Ok(Header { columns: whole(0), rows: whole(1), world_from_local, world_from_sensor, transposed, start: at })
+}
+
+/// Turns a matrix over that was written for column vectors, and returns whether it was. Only the place of the
+/// translation tells: it is in the last row, unless that row is 0 0 0 1 and the last column is not.
+fn transpose(values: &mut [[f64; 4]; 10]) -> Result<bool, String> {
+    let last = [0, 1, 2, 3].map(|line| values[6 + line][3]);
+    if last[..3] == [0.0; 3] {
+        return Ok(false);
+    }
+    if values[9] != [0.0, 0.0, 0.0, 1.0] {
+        let what = "neither the last column nor the last row of the matrix before this line is 0 0 0 1; correct it";
+        return Err(what.into());
+    }
+    let matrix = [values[6], values[7], values[8], values[9]];
+    for (row, line) in values[6..].iter_mut().enumerate() {
+        *line = matrix.map(|column| column[row]);
+    }
+    Ok(true)
 }
 
 /// The map without its scaling.
@@ -155,6 +184,11 @@ fn walk(job: &Job<'_>, only_first: bool) -> Result<Vec<FoundScan>, Error> {
                 format!("{width} values; points have 3, 4 with intensity, 6 with colour, or 7 with both"),
             ));
         }
+        // Lines without a return may lack the colour that the others have.
+        let range = header.start..end;
+        let mut widths =
+            lines::lines(bytes, &range).take(count.min(SAMPLED_LINES)).map(|(_, line)| text::values(line).count());
+        let width = widths.find(|&other| width < 6 && other == width + 3).unwrap_or(width);
         at = end;
         scans.push(FoundScan { points: header.start..end, header, count, width });
     }
@@ -183,7 +217,7 @@ fn after_lines(bytes: &[u8], mut at: usize, count: usize) -> (usize, usize) {
     (at, lines + usize::from(unfinished))
 }
 
-/// Points of a scan as records: x, y and z in 24 bytes, intensity in 4, colour in 3.
+/// Points of a scan as records: x, y and z in 24 bytes, intensity in 4, colour in 12.
 struct Records {
     bytes: Vec<u8>,
     stride: usize,
@@ -194,19 +228,37 @@ struct Records {
     /// Indices of the points with a return, unless all points have one.
     keep: Option<Vec<usize>>,
     count: usize,
+    /// Number of points without a colour, if others have one.
+    uncolored: usize,
 }
 
 impl Records {
     fn parse(job: &Job<'_>, scan: &FoundScan, part: ProgressRange) -> Result<Self, Error> {
-        let (has_intensity, has_color) = (matches!(scan.width, 4 | 7), scan.width >= 6);
+        Self::of_width(job, scan, scan.width, part).or_else(|error| match error {
+            // The first lines with a colour may come late.
+            Error::Malformed { .. } if scan.width < 6 => {
+                Self::of_width(job, scan, scan.width + 3, part).map_err(|_| error)
+            }
+            _ => Err(error),
+        })
+    }
+
+    fn of_width(job: &Job<'_>, scan: &FoundScan, width: usize, part: ProgressRange) -> Result<Self, Error> {
+        let (has_intensity, has_color) = (matches!(width, 4 | 7), width >= 6);
         let mut tokens = vec![Token::Store(Scalar::F64); 3];
         tokens.extend(has_intensity.then_some(Token::Store(Scalar::F32)));
-        tokens.extend([Token::Store(Scalar::U8); 3].into_iter().take(if has_color { 3 } else { 0 }));
+        tokens.extend([Token::Store(Scalar::F32); 3].into_iter().take(if has_color { 3 } else { 0 }));
         let stride: usize = tokens.iter().map(|token| token.size()).sum();
         job.check_memory(scan.count, 2 * stride)?;
-        let rows = Rows { tokens: &tokens, count: Some(scan.count), counts_between: false };
+        // Numbers of nothing but set bits are not numbers.
+        let short = Short::new(width.saturating_sub(3), u8::MAX);
+        let rows = Rows { tokens: &tokens, count: Some(scan.count), may_be_cut: false };
         let own = Job { bytes: &job.bytes[..scan.points.end], ..*job };
-        let (bytes, count) = rows.parse(&own, scan.points.start, part)?;
+        let (bytes, count) = if has_color {
+            rows.parse_with_short(&own, scan.points.start, part, &short)?
+        } else {
+            rows.parse(&own, scan.points.start, part)?
+        };
         let color = 24 + if has_intensity { 4 } else { 0 };
         let mut records = Self {
             bytes,
@@ -216,6 +268,7 @@ impl Records {
             world_from_local: scan.header.world_from_local,
             keep: None,
             count,
+            uncolored: short.rows(),
         };
         if !job.options.keep_no_returns {
             let seen = |i: &usize| records.local(*i) != DVec3::ZERO;
@@ -244,19 +297,28 @@ impl Records {
         if self.world_from_local == DMat4::IDENTITY { local } else { self.world_from_local.transform_point3(local) }
     }
 
-    fn intensity(&self, point: usize) -> f32 {
-        self.intensity.map_or(f32::NAN, |at| {
-            let mut raw = [0; 4];
-            raw.copy_from_slice(&self.record(point)[at..at + 4]);
-            f32::from_le_bytes(raw)
-        })
+    fn number(&self, point: usize, at: usize) -> f32 {
+        let mut raw = [0; 4];
+        raw.copy_from_slice(&self.record(point)[at..at + 4]);
+        f32::from_le_bytes(raw)
     }
 
-    fn color(&self, point: usize) -> [u8; 3] {
+    fn intensity(&self, point: usize) -> f32 {
+        self.intensity.map_or(f32::NAN, |at| self.number(point, at))
+    }
+
+    /// Levels of the colours of some points.
+    fn levels(&self, points: Range<usize>) -> Levels {
+        let Some(at) = self.color else { return Levels::default() };
+        let channel = |point: usize| [at, at + 4, at + 8].map(|at| f64::from(self.number(point, at)));
+        Levels::of(points.len(), |i| channel(points.start + i))
+    }
+
+    fn color(&self, point: usize, scale: ColorScale) -> [u8; 3] {
         // Grey, if other scans have colours.
-        self.color.map_or([200; 3], |at| {
-            let record = self.record(point);
-            [record[at], record[at + 1], record[at + 2]]
+        self.color.map_or([GREY; 3], |at| {
+            let rgb = [at, at + 4, at + 8].map(|at| f64::from(self.number(point, at)));
+            if rgb[0].is_nan() { [GREY; 3] } else { rgb.map(|value| scale.byte(value)) }
         })
     }
 }
@@ -280,6 +342,15 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
             preview(job, &parsed)?;
         }
         records.push(parsed);
+    }
+    let transposed = scans.iter().filter(|scan| scan.header.transposed).count();
+    if transposed > 0 {
+        let count = scans.len();
+        job.note(format!("{transposed} of {count} scans have a matrix for column vectors; turned over"));
+    }
+    let uncolored: usize = records.iter().map(|records| records.uncolored).sum();
+    if uncolored > 0 {
+        job.note(format!("{uncolored} lines have no colour, while others of their scan do; taken for grey"));
     }
     let lens: Vec<usize> = records.iter().map(Records::len).collect();
     let total: usize = records.iter().map(|records| records.count).sum();
@@ -327,9 +398,12 @@ fn cloud(
     if records.iter().all(|records| records.color.is_none()) {
         return Ok(cloud);
     }
+    let levels = records.iter().map(|records| records.levels(0..records.len()));
+    let scale = ColorScale::of_levels(levels.fold(Levels::default(), Levels::and), true);
+    scale.note().iter().for_each(|note| job.note(note));
     let colors = fill(job, "colours", lens, part(1), |scan| {
         let records = &records[scan];
-        move |i| records.color(i)
+        move |i| records.color(i, scale)
     })?;
     cloud.with_colors(colors)
 }
@@ -345,7 +419,8 @@ fn preview(job: &Job<'_>, records: &Records) -> Result<(), Error> {
             if records.color.is_none() {
                 return Ok(cloud);
             }
-            cloud.with_colors(fill(&quiet, "colours", &lens, nothing, |_| move |i| records.color(start + i))?)
+            let scale = ColorScale::of_levels(records.levels(start..start + lens[0]), true);
+            cloud.with_colors(fill(&quiet, "colours", &lens, nothing, |_| move |i| records.color(start + i, scale))?)
         })?;
     }
     Ok(())

@@ -2,16 +2,18 @@
 
 use std::path::Path;
 
-use autosplats_cloud::{Bytes, Contents, Error, PointCloud, Progress};
+use autosplats_cloud::{Bytes, Contents, Error, LeftOut, PointCloud, Progress};
 
 use super::{
-    depth_image,
+    choose, depth_image,
     describe::Description,
-    e57, gltf,
+    e57, gltf, grid,
     job::{Format, Job},
     las, obj, off,
     options::ReadOptions,
-    pcd, ply, ptx, raw, sensor, stl, units, xyz,
+    pcd, ply, ptx, raw, sensor, stl, units,
+    unpack::{Unpacked, without_gz},
+    xyz,
 };
 
 /// All formats, in order of precedence: by content first, then by extension. Longer extensions precede shorter ones.
@@ -26,6 +28,7 @@ const FORMATS: &[&Format] = &[
     &depth_image::FORMAT,
     &raw::FORMAT,
     &ptx::FORMAT,
+    &grid::FORMAT,
     &xyz::FORMAT,
     // STL is recognised only by a number that fits the file's size, so it comes last.
     &stl::FORMAT,
@@ -59,7 +62,8 @@ fn format_names() -> String {
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read; [`Error::UnknownFormat`], [`Error::Malformed`] and [`Error::Unsupported`]
-/// for its content; [`Error::OutOfMemory`]; and [`Error::Cancelled`] if `progress` says so.
+/// for its content; [`Error::NothingKept`] if the options keep none of its points; [`Error::OutOfMemory`]; and
+/// [`Error::Cancelled`] if `progress` says so.
 ///
 /// # Examples
 ///
@@ -109,7 +113,39 @@ pub fn read_bytes(
     options: &ReadOptions,
     progress: &dyn Progress,
 ) -> Result<PointCloud, Error> {
-    Ok(contents(&Job { path: name, progress, bytes, options, triangles: false })?.cloud)
+    with_job(name, bytes, options, progress, false, |job, _| Ok(kept(job)?.cloud))
+}
+
+/// Like [`read_with`], but returns all points, and which of them [`ReadOptions::keep`] leaves out.
+///
+/// # Errors
+/// Those of [`read`].
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::PointFilter;
+/// use autosplats_formats::{ReadOptions, read_marked};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("scan.csv");
+/// std::fs::write(&path, "x,y,z,Classification\n1,2,3,2\n4,5,60,7\n")?;
+/// let options = ReadOptions { keep: Some(PointFilter::usual()), ..ReadOptions::default() };
+/// let (cloud, left_out) = read_marked(&path, &options, &())?;
+/// assert_eq!(cloud.len(), 2);
+/// assert!(!left_out.has(0) && left_out.has(1), "noise");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read_marked(
+    path: &Path,
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<(PointCloud, LeftOut), Error> {
+    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    with_job(path, &bytes, options, progress, false, |job, _| {
+        let (contents, left) = contents(job)?;
+        Ok((contents.cloud, left))
+    })
 }
 
 /// Reads points and the triangles between them.
@@ -143,7 +179,7 @@ pub fn read_mesh_bytes(
     options: &ReadOptions,
     progress: &dyn Progress,
 ) -> Result<Contents, Error> {
-    contents(&Job { path: name, progress, bytes, options, triangles: true })
+    with_job(name, bytes, options, progress, true, |job, _| kept(job))
 }
 
 /// Duration of the first animation of a glTF in seconds, and the number of animations, if there are any.
@@ -151,8 +187,7 @@ pub fn read_mesh_bytes(
 /// # Errors
 /// Those of [`read`].
 pub fn gltf_animation(name: &Path, bytes: &[u8]) -> Result<Option<(f64, usize)>, Error> {
-    let options = ReadOptions::default();
-    gltf::animation(&Job { path: name, progress: &(), bytes, options: &options, triangles: false })
+    with_job(name, bytes, &ReadOptions::default(), &(), false, |job, _| gltf::animation(job))
 }
 
 /// The mesh of a glTF at a time of its first animation.
@@ -160,8 +195,7 @@ pub fn gltf_animation(name: &Path, bytes: &[u8]) -> Result<Option<(f64, usize)>,
 /// # Errors
 /// Those of [`read`].
 pub fn read_gltf_at(name: &Path, bytes: &[u8], seconds: f64, progress: &dyn Progress) -> Result<Contents, Error> {
-    let options = ReadOptions::default();
-    gltf::read_at(&Job { path: name, progress, bytes, options: &options, triangles: true }, Some(seconds))
+    with_job(name, bytes, &ReadOptions::default(), progress, true, |job, _| gltf::read_at(job, Some(seconds)))
 }
 
 /// Reads the header of a file, in milliseconds whatever the file's size. Of formats without a header that states counts
@@ -192,10 +226,56 @@ pub fn describe(path: &Path, options: &ReadOptions) -> Result<Description, Error
 /// # Ok::<(), autosplats_cloud::Error>(())
 /// ```
 pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Description, Error> {
-    let job = Job { path: name, progress: &(), bytes, options, triangles: false };
-    let mut description = (format(&job)?.describe)(&job)?;
-    units::settle_description(&mut description);
-    Ok(description)
+    with_job(name, bytes, options, &(), false, |job, unpacked| {
+        let mut description = (format(job)?.describe)(job)?;
+        units::settle_description(&mut description);
+        if let Some(encoding) = unpacked.encoding {
+            description.details.retain(|(name, _)| name != "encoding");
+            description.details.insert(0, ("encoding".into(), encoding.into()));
+        }
+        if unpacked.compressed {
+            description.details.insert(0, ("compressed with".into(), "gzip".into()));
+        }
+        description.notes.extend(unpacked.note.clone());
+        Ok(description)
+    })
+}
+
+/// Runs a reader on the bytes of a file, decompressed and without a byte order mark.
+fn with_job<T>(
+    path: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+    progress: &dyn Progress,
+    triangles: bool,
+    run: impl FnOnce(&Job<'_>, &Unpacked<'_>) -> Result<T, Error>,
+) -> Result<T, Error> {
+    let unpacked = Unpacked::of(path, bytes, progress)?;
+    let job = Job { path, progress, bytes: &unpacked.bytes, options, triangles };
+    unpacked.note.iter().for_each(|note| job.note(note));
+    run(&job, &unpacked)
+}
+
+/// Whether a name ends as those of a readable format do, or as those of such a file compressed with gzip.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_formats::is_named_as_points;
+///
+/// assert!(is_named_as_points("scan.ply".as_ref()) && is_named_as_points("survey.XYZ.gz".as_ref()));
+/// assert!(!is_named_as_points("notes.odt".as_ref()) && !is_named_as_points("backup.gz".as_ref()));
+/// ```
+#[must_use]
+pub fn is_named_as_points(path: &Path) -> bool {
+    named(path).is_some()
+}
+
+/// The format whose extension the name has.
+fn named(path: &Path) -> Option<&'static Format> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let ends = |extension: &&str| without_gz(&name).strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
+    FORMATS.iter().find(|format| format.extensions.iter().any(ends)).copied()
 }
 
 /// Fails if the bytes of a file are a Git LFS pointer instead of the data.
@@ -212,35 +292,42 @@ pub fn check_not_lfs_pointer(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 
 fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
     check_not_lfs_pointer(job.path, job.bytes)?;
-    let name = job.path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
-    let by_content = FORMATS.iter().find(|format| (format.recognised)(job.bytes));
-    let by_name = || FORMATS.iter().find(|format| format.extensions.iter().any(ends));
+    let by_content = FORMATS.iter().find(|format| (format.recognised)(job.bytes)).copied();
     // Rows of numbers can stand in files of any name, so they are looked for last.
-    let rows = || xyz::looks_like_rows(job.bytes).then_some(&&xyz::FORMAT);
+    let rows = || xyz::looks_like_rows(job.bytes).then_some(&xyz::FORMAT);
     by_content
-        .or_else(by_name)
+        .or_else(|| named(job.path))
         .or_else(rows)
-        .copied()
         .ok_or_else(|| Error::UnknownFormat { path: job.path.into(), known: format_names() })
 }
 
-fn contents(job: &Job<'_>) -> Result<Contents, Error> {
+/// Reads a file and removes the points that the options leave out.
+fn kept(job: &Job<'_>) -> Result<Contents, Error> {
+    let (mut contents, left) = contents(job)?;
+    choose::remove(&mut contents, &left);
+    Ok(contents)
+}
+
+/// Reads a file. Returns the points that the options leave out too.
+fn contents(job: &Job<'_>) -> Result<(Contents, LeftOut), Error> {
     job.tick(0.0)?;
     let format = format(job)?;
     if job.options.columns.is_some() && !takes_columns(job, format) {
         job.note(format!("--columns is for text and headerless records; {} names its own columns", format.name));
     }
-    let mut contents = (format.read)(job)?;
+    let previews = choose::ChosenPreviews::new(job, format);
+    let progress = previews.as_ref().map_or(job.progress, |previews| previews as &dyn Progress);
+    let mut contents = (format.read)(&Job { progress, ..*job })?;
     units::settle(job, &mut contents.cloud)?;
     let model = MODELS.iter().any(|model| model.name == format.name) || ply::is_mesh(job);
     // Dropping points would remove corners of a mesh.
     if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {
         drop_no_returns(job, format, &mut contents.cloud);
     }
+    let left = choose::left_out(job, format, &contents.cloud)?;
     sensor::drop_far(job, &mut contents.cloud);
     job.tick(1.0)?;
-    Ok(contents)
+    Ok((contents, left))
 }
 
 /// Whether the caller may name the columns of this file.

@@ -9,13 +9,19 @@ use rayon::prelude::*;
 pub use super::columns::{MAX_COLUMNS, numbered};
 use super::{
     Attribute, Job, ReadOptions,
-    columns::{field_name, find_axes, find_color, is_longitude},
+    columns::{AGAIN, field_name, find_axes, find_color, is_longitude},
     units::{LOOKS_LIKE_DEGREES, look_like_degrees},
 };
 use crate::color_scale::ColorScale;
 
 /// Points processed between two checks for cancellation: a few milliseconds of work.
 const BLOCK: usize = 1 << 18;
+
+/// Columns of 3D Gaussian splats that hold the coefficients of the colour seen from everywhere.
+const SPLAT_COLORS: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
+
+/// The spherical harmonic of degree 0: 1 / (2 √π).
+const SPLAT_COLOR_STEP: f64 = 0.282_094_791_773_878_14;
 
 /// Number types in files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,6 +137,11 @@ pub struct Table<'a> {
     pub done: f32,
 }
 
+/// Whether a value is a colour packed into 32 bits.
+pub(super) fn is_packed_color(name: &str, scalar: Scalar) -> bool {
+    scalar.size() == 4 && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase())
+}
+
 impl Table<'_> {
     /// Makes the cloud. Errors name `name`, and `place` where coordinates are missing.
     ///
@@ -168,12 +179,15 @@ impl Table<'_> {
         job.check_memory(self.count, 12 + exact + fields)?;
         let names: Vec<String> = self.columns.iter().map(|column| column.name.clone()).collect();
         let colors = find_color(&names).map(|three| self.take(three));
-        let packed = self.columns.iter().position(|column| {
-            self.packed_rgb && column.scalar.size() == 4 && ["rgb", "rgba"].contains(&&*column.name.to_lowercase())
-        });
-        let packed = packed.map(|index| self.columns.remove(index));
+        let is_packed = |column: &Column| self.packed_rgb && is_packed_color(&column.name, column.scalar);
+        let packed = self.columns.iter().position(is_packed).map(|index| self.columns.remove(index));
+        let splats = match (&colors, &packed) {
+            (None, None) => self.find(SPLAT_COLORS).map(|indices| indices.map(|index| self.columns[index].clone())),
+            _ => None,
+        };
 
-        let steps = 1 + usize::from(colors.is_some() || packed.is_some()) + self.columns.len();
+        let colored = colors.is_some() || packed.is_some() || splats.is_some();
+        let steps = 1 + usize::from(colored) + self.columns.len();
         let part = |step: usize| ProgressRange {
             start: self.done + (1.0 - self.done) * step as f32 / steps as f32,
             len: (1.0 - self.done) / steps as f32,
@@ -212,14 +226,27 @@ impl Table<'_> {
             };
             cloud = cloud.with_colors(collect("colours", self.count, job, part(step), unpack)?)?;
             step += 1;
+        } else if let Some(rgb) = &splats {
+            job.note("these are 3D Gaussian splats; shown as points in their base colours");
+            let byte = |column: &Column, i| ((0.5 + SPLAT_COLOR_STEP * self.value_f64(column, i)) * 255.0 + 0.5) as u8;
+            let color = |i| rgb.each_ref().map(|column| byte(column, i));
+            cloud = cloud.with_colors(collect("colours", self.count, job, part(step), color)?)?;
+            step += 1;
         }
+        let known = xyz.iter().chain(colors.iter().flatten());
+        let known: Vec<String> = known.map(|column| column.name.to_lowercase()).collect();
         for column in &self.columns {
             let values = self.field(job, column, part(step))?;
             step += 1;
             // Two columns may map to one name, as `intensity` and `scalar_Intensity` do.
             let mut name = field_name(&column.name);
+            let again = known.contains(&name.to_lowercase());
+            if again {
+                job.note(format!("there is more than one {name}; the first is read, another is kept as {name}{AGAIN}"));
+                name.push_str(AGAIN);
+            }
             while cloud.fields().iter().any(|field| field.name == name) {
-                name.push('_');
+                name.push_str(if again { AGAIN } else { "_" });
             }
             cloud = cloud.with_field(name, values)?;
         }
@@ -243,6 +270,12 @@ impl Table<'_> {
             job.preview(|| piece.into_cloud(&quiet, place))?;
         }
         Ok(())
+    }
+
+    /// Indices of the columns of three names, if all are there. Letter case is ignored.
+    fn find(&self, names: [&str; 3]) -> Option<[usize; 3]> {
+        let find = |name: &str| self.columns.iter().position(|column| column.name.eq_ignore_ascii_case(name));
+        Some([find(names[0])?, find(names[1])?, find(names[2])?])
     }
 
     /// Removes and returns three columns.
@@ -365,11 +398,12 @@ impl Table<'_> {
             return Ok((colors, true));
         }
         job.tick(part.start)?;
-        let largest = |i: usize| rgb.map(|column| self.value_f64(column, i)).into_iter().fold(0.0, f64::max);
-        let largest = (0..self.count).into_par_iter().map(largest).reduce(|| 0.0, f64::max);
         let float = rgb.iter().any(|column| matches!(column.scalar, Scalar::F32 | Scalar::F64));
-        let scale = ColorScale::of(largest, float);
-        if !float && largest <= 255.0 && rgb.iter().any(|column| column.scalar.size() > 1) && self.count > 0 {
+        let scale = ColorScale::of(self.count, float, |i| rgb.map(|column| self.value_f64(column, i)));
+        let wide = !float && rgb.iter().any(|column| column.scalar.size() > 1) && self.count > 0;
+        if let Some(note) = scale.note() {
+            job.note(note);
+        } else if wide && scale.full() == 255.0 {
             job.note("colours of 16 bits or more have no value above 255; read as 8 bits");
         }
         let colors =

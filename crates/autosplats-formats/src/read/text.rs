@@ -3,13 +3,15 @@
 //! The text is cut into pieces at line ends, and the pieces are parsed in parallel. Each row becomes one record of
 //! little-endian numbers for a [`Table`](super::table::Table).
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use autosplats_cloud::{Error, excerpt};
 use rayon::prelude::*;
 
 use super::{
     Job,
     columns::{is_latitude, is_longitude},
-    table::{CHUNK, ProgressRange, Scalar, reserve},
+    table::{CHUNK, ProgressRange, Scalar, is_packed_color, reserve},
 };
 
 /// Bytes of text that one thread parses at a time.
@@ -37,6 +39,18 @@ pub(super) enum Token {
 }
 
 impl Token {
+    /// How to store a value of this name and declared type, and in which type: coordinates keep all their digits, and
+    /// packed colours their bits.
+    pub(super) fn of(name: &str, scalar: Scalar) -> (Scalar, Self) {
+        if is_coordinate(name) {
+            (Scalar::F64, Self::Store(Scalar::F64))
+        } else if is_packed_color(name, scalar) {
+            (Scalar::U32, Self::Packed)
+        } else {
+            (scalar, Self::Store(scalar))
+        }
+    }
+
     /// Bytes of the value in the record.
     pub(super) fn size(self) -> usize {
         match self {
@@ -52,8 +66,26 @@ pub(super) struct Rows<'a> {
     pub(super) tokens: &'a [Token],
     /// Number of rows to read; `None` reads to the end of the file.
     pub(super) count: Option<usize>,
-    /// Whether lines of a single integer are counts, not rows.
-    pub(super) counts_between: bool,
+    /// Whether the text may end before all rows, which is told.
+    pub(super) may_be_cut: bool,
+}
+
+/// Rows that end early: after how many values, the byte that fills the rest of their records, and how many there are.
+pub(super) struct Short {
+    values: usize,
+    fill: u8,
+    rows: AtomicUsize,
+}
+
+impl Short {
+    pub(super) fn new(values: usize, fill: u8) -> Self {
+        Self { values, fill, rows: AtomicUsize::new(0) }
+    }
+
+    /// Number of such rows so far.
+    pub(super) fn rows(&self) -> usize {
+        self.rows.load(Ordering::Relaxed)
+    }
 }
 
 /// Result of parsing one piece of text.
@@ -69,6 +101,17 @@ impl Rows<'_> {
         self.parse_and_show(job, start, part, |_, _| Ok(()))
     }
 
+    /// Like [`parse`](Self::parse), of rows of which some end early.
+    pub(super) fn parse_with_short(
+        &self,
+        job: &Job<'_>,
+        start: usize,
+        part: ProgressRange,
+        short: &Short,
+    ) -> Result<(Vec<u8>, usize), Error> {
+        self.parse_all(job, start, part, Some(short), |_, _| Ok(()))
+    }
+
     /// Like [`parse`](Self::parse), and passes the records and their number to `show`, about a million at a time,
     /// before the next ones are parsed.
     pub(super) fn parse_and_show(
@@ -78,11 +121,23 @@ impl Rows<'_> {
         part: ProgressRange,
         show: impl Fn(&[u8], usize) -> Result<(), Error>,
     ) -> Result<(Vec<u8>, usize), Error> {
+        self.parse_all(job, start, part, None, show)
+    }
+
+    fn parse_all(
+        &self,
+        job: &Job<'_>,
+        start: usize,
+        part: ProgressRange,
+        short: Option<&Short>,
+        show: impl Fn(&[u8], usize) -> Result<(), Error>,
+    ) -> Result<(Vec<u8>, usize), Error> {
         let len = self.record_len();
         let text = job.bytes;
         let wanted = self.count.unwrap_or(usize::MAX);
         let mut records = Vec::new();
         let (mut rows, mut shown) = (0, 0);
+        let mut complete_last = true;
         let mut at = start;
         while at < text.len() && rows < wanted {
             job.tick(part.start + part.len * (at - start) as f32 / (text.len() - start) as f32)?;
@@ -92,7 +147,7 @@ impl Rows<'_> {
                 cuts.push(at);
             }
             let pieces: Vec<Piece> =
-                cuts.par_windows(2).map(|cut| self.parse_piece(&text[cut[0]..cut[1]], cut[0])).collect();
+                cuts.par_windows(2).map(|cut| self.parse_piece(&text[cut[0]..cut[1]], cut[0], short)).collect();
             for piece in pieces {
                 let take = piece.rows.min(wanted - rows);
                 let bytes = take * len;
@@ -103,6 +158,11 @@ impl Rows<'_> {
                     break;
                 }
                 if let Some((offset, what)) = piece.error {
+                    // An unfinished last line.
+                    if self.may_be_cut && rows > 0 && line_end(text, offset) == text.len() {
+                        complete_last = false;
+                        break;
+                    }
                     return Err(job.malformed(job.line(offset), what));
                 }
             }
@@ -112,10 +172,20 @@ impl Rows<'_> {
             }
         }
         if self.count.is_some() && rows < wanted {
-            return Err(job.malformed(
-                job.line(text.len()),
-                format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
-            ));
+            if self.may_be_cut {
+                if !text.ends_with(b"\n") && complete_last {
+                    // Digits of the last value may be missing.
+                    rows = rows.saturating_sub(1);
+                    records.truncate(rows * len);
+                    shown = shown.min(rows);
+                }
+                job.tell_cut_off(rows, wanted, "points")?;
+            } else {
+                return Err(job.malformed(
+                    job.line(text.len()),
+                    format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
+                ));
+            }
         }
         show(&records[shown * len..], rows - shown)?;
         Ok((records, rows))
@@ -125,15 +195,15 @@ impl Rows<'_> {
         self.tokens.iter().map(|token| token.size()).sum()
     }
 
-    fn parse_piece(&self, text: &[u8], start: usize) -> Piece {
+    fn parse_piece(&self, text: &[u8], start: usize, short: Option<&Short>) -> Piece {
         let mut piece = Piece { records: Vec::new(), rows: 0, error: None };
         let mut at = 0;
         while at < text.len() {
             let end = line_end(text, at);
-            let line = text[at..end].trim_ascii();
-            if !(is_blank(line) || self.counts_between && is_count(line)) {
+            let line = trim(&text[at..end]);
+            if !is_blank(line) {
                 let len = piece.records.len();
-                if let Err(what) = self.parse_row(line, &mut piece.records) {
+                if let Err(what) = self.parse_row(line, short, &mut piece.records) {
                     piece.records.truncate(len);
                     piece.error = Some((start + at, what));
                     break;
@@ -145,12 +215,23 @@ impl Rows<'_> {
         piece
     }
 
-    fn parse_row(&self, line: &[u8], record: &mut Vec<u8>) -> Result<(), String> {
+    fn parse_row(&self, line: &[u8], short: Option<&Short>, record: &mut Vec<u8>) -> Result<(), String> {
         let mut values = values(line);
         for (index, token) in self.tokens.iter().enumerate() {
-            let value = values.next().ok_or_else(|| {
-                format!("{index} values where a point has {}; complete or remove the line", self.tokens.len())
-            })?;
+            let Some(value) = values.next() else {
+                let rest = self.tokens[index..].iter().map(|token| token.size()).sum::<usize>();
+                return match short.filter(|short| short.values == index) {
+                    Some(short) => {
+                        record.resize(record.len() + rest, short.fill);
+                        short.rows.fetch_add(1, Ordering::Relaxed);
+                        Ok(())
+                    }
+                    None => Err(format!(
+                        "{index} values where a point has {}; complete or remove the line",
+                        self.tokens.len()
+                    )),
+                };
+            };
             match token {
                 Token::Skip => {}
                 Token::SkipList => {
@@ -198,15 +279,12 @@ fn store(scalar: Scalar, value: &[u8], record: &mut Vec<u8>) -> Result<(), Strin
     Ok(())
 }
 
-/// Decodes a packed colour: an integer, a float whose bits are the colour, or, in old files, a float whose value is the
-/// colour. Such values are whole numbers, which floats of colour bits never are.
+/// Decodes a packed colour: an integer, or, with a point or an exponent, a float whose bits are the colour.
 fn packed(value: &[u8]) -> Result<u32, String> {
-    if let Some(integer) = std::str::from_utf8(value).ok().and_then(|text| text.parse::<i64>().ok()) {
-        return Ok(integer as u32);
+    match std::str::from_utf8(value).ok().and_then(|text| text.parse::<i64>().ok()) {
+        Some(integer) => Ok(integer as u32),
+        None => Ok((number(value)? as f32).to_bits()),
     }
-    let number = number(value)?;
-    let whole = number.fract() == 0.0 && (1.0..16_777_216.0).contains(&number);
-    Ok(if whole { number as u32 } else { (number as f32).to_bits() })
 }
 
 /// A number, including `nan` and `inf` in any letter case.
@@ -224,6 +302,17 @@ pub(super) fn number(value: &[u8]) -> Result<f64, String> {
 /// The values of a line, separated by blanks, commas or semicolons.
 pub(super) fn values(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|byte| matches!(byte, b' ' | b'\t' | b',' | b';' | b'\r')).filter(|value| !value.is_empty())
+}
+
+/// A line without the blanks around it, and without a byte order mark.
+pub(super) fn trim(line: &[u8]) -> &[u8] {
+    without_mark(line.trim_ascii()).trim_ascii_start()
+}
+
+/// A line without the byte order mark that the parts of joined files begin with.
+#[inline]
+pub(super) fn without_mark(line: &[u8]) -> &[u8] {
+    line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line)
 }
 
 /// Whether a trimmed line is empty or a comment.

@@ -22,8 +22,7 @@ pub(super) fn wide_colors(cloud: &PointCloud) -> Option<[&FieldValues; 3]> {
     let Some(colors) = cloud.colors() else { return Some(wide) };
     let float = matches!(wide[0], FieldValues::F32(_) | FieldValues::F64(_));
     let points = || (0..cloud.len()).into_par_iter();
-    let largest = points().map(|i| wide.iter().map(|values| values.get(i)).fold(0.0, f64::max));
-    let scale = ColorScale::of(largest.reduce(|| 0.0, f64::max), float);
+    let scale = ColorScale::of(cloud.len(), float, |i| wide.map(|values| values.get(i)));
     // Some formats round where others cut.
     let same = |i: usize| (0..3).all(|c| scale.byte(wide[c].get(i)).abs_diff(colors[i][c]) <= 1);
     points().all(same).then_some(wide)

@@ -5,7 +5,7 @@ use std::{
     io::{BufWriter, Write as _},
 };
 
-use autosplats_cloud::{Axes, Crs, Error, Field, FieldValues, PointCloud, each_type};
+use autosplats_cloud::{Crs, Error, Field, FieldValues, PointCloud, each_type};
 use glam::{DMat4, DQuat, DVec3};
 
 use super::{Format, Job, names::unique_names, records::write_records};
@@ -81,12 +81,7 @@ impl Layout {
             };
             fields.push((name, kind, size));
         }
-        let axes = match cloud.axes() {
-            Some(Axes::ZUp) => "# axes z-up\n",
-            Some(Axes::YUp) => "# axes y-up\n",
-            Some(Axes::Camera) => "# axes camera\n",
-            None => "",
-        };
+        let axes = cloud.axes().map_or_else(String::new, |axes| format!("# axes {}\n", axes.name()));
         // The default viewpoint may mean a sensor at the origin or none.
         let sensor = if only_pose(cloud).is_some() { "# sensor at VIEWPOINT\n" } else { "" };
         let words =

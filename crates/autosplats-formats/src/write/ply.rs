@@ -6,7 +6,7 @@ use std::{
     ops::Range,
 };
 
-use autosplats_cloud::{Axes, Error, Field, FieldValues, PointCloud, each_type};
+use autosplats_cloud::{Error, Field, FieldValues, PointCloud, each_type};
 use rayon::prelude::*;
 
 use super::{
@@ -75,12 +75,7 @@ impl<'a> Layout<'a> {
 
     fn header(&self, cloud: &PointCloud) -> String {
         let mut header = String::from("ply\nformat binary_little_endian 1.0\n");
-        header += match cloud.axes() {
-            Some(Axes::ZUp) => "comment axes z-up\n",
-            Some(Axes::YUp) => "comment axes y-up\n",
-            Some(Axes::Camera) => "comment axes camera\n",
-            None => "",
-        };
+        header += &cloud.axes().map_or_else(String::new, |axes| format!("comment axes {}\n", axes.name()));
         header += &format!("element vertex {}\n", cloud.len());
         for axis in ["x", "y", "z"] {
             header += &format!("property {} {axis}\n", if self.doubles { "double" } else { "float" });

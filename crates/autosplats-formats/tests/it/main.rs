@@ -2,9 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
+mod choosing;
+mod color_scales;
 mod common;
+mod depth_images;
 mod e57;
 mod e57_faults;
+mod field_text;
 mod formats;
 mod gltf;
 mod hostile;
@@ -13,6 +17,7 @@ mod las_faults;
 mod las_writing;
 mod losses;
 mod meshes;
+mod oddities;
 mod progress;
 mod ptx;
 mod real_files;

@@ -113,6 +113,42 @@ fn scans_of_unlike_lines() {
 }
 
 #[test]
+fn lines_without_a_colour_among_others() {
+    let scan = |points: &[&str]| format!("1\n{}\n{PLAIN}{}\n", points.len(), points.join("\n"));
+    for (points, colors) in [
+        (["1 0 0 0.5 9 8 7", "2 0 0 0.25", "0 0 0 0.5"], [[9, 8, 7], [200; 3]]),
+        (["0 0 0 0.5", "1 0 0 0.5", "2 0 0 0.25 9 8 7"], [[200; 3], [9, 8, 7]]),
+        (["1 0 0", "2 0 0 9 8 7", "0 0 0"], [[200; 3], [9, 8, 7]]),
+    ] {
+        let (cloud, told) = load(&scan(&points), &ReadOptions::default());
+        assert_eq!(cloud.positions(), [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], "{points:?}");
+        assert_eq!(cloud.colors().unwrap(), colors, "{points:?}");
+        assert!(told.notes.lock().unwrap()[0].contains("2 lines have no colour"), "told");
+    }
+    // The first colour comes after the lines that are looked at.
+    let mut points = vec!["1 0 0 0.5"; 5000];
+    points[4000] = "2 0 0 0.5 9 8 7";
+    assert_eq!(load(&scan(&points), &ReadOptions::default()).0.colors().unwrap()[4000], [9, 8, 7], "late");
+    points[4500] = "1 2";
+    assert!(error("a.ptx", scan(&points).as_bytes()).contains("line 4011: more values"), "the first line that is odd");
+}
+
+#[test]
+fn matrices_for_column_vectors_are_turned_over() {
+    let places = "500000.5 5400000.25 100\n0 1 0\n-1 0 0\n0 0 1\n";
+    let column = format!("{places}0 -1 0 500000.5\n1 0 0 5400000.25\n0 0 1 100\n0 0 0 1\n");
+    let points = "1 0 0\n0 2 0.125\n";
+    let (usual, _) = load(&format!("1\n2\n{TURNED}{points}"), &ReadOptions::default());
+    let (cloud, told) = load(&format!("1\n2\n{column}{points}"), &ReadOptions::default());
+    assert_eq!((cloud.positions(), cloud.origin()), (usual.positions(), usual.origin()), "the same points");
+    assert_eq!(cloud.scans(), usual.scans(), "and the same sensor");
+    assert!(told.notes.lock().unwrap()[0].contains("1 of 1 scans have a matrix for column vectors"), "told");
+    let both = column.replace("0 0 0 1\n", "5 5 5 1\n");
+    let message = error("a.ptx", format!("1\n2\n{both}{points}").as_bytes());
+    assert!(message.contains("neither the last column nor the last row"), "{message}");
+}
+
+#[test]
 fn faults_are_told_by_line() {
     let scan = |points: &str| format!("1\n2\n{PLAIN}{points}");
     let cases = [
@@ -120,7 +156,6 @@ fn faults_are_told_by_line() {
         (scan("1 2 3 0.5\n1 2 x 0.5\n"), "line 12", "'x' is not a number"),
         (scan("1 2 3 0.5\n1 2 3\n"), "line 12", "3 values where a point has 4"),
         (scan("1 2 3 0.5 1\n1 2 3 0.5 1\n"), "line 11", "5 values"),
-        (scan("1 2 3 0.5 1 2 256\n1 2 3 0.5 1 2 3\n"), "line 11", "256 does not fit u8"),
         (format!("{}7 7 7 0\n", scan("1 2 3 0.5\n4 5 6 0.5\n")), "line 13", "line 1 of a header"),
         (format!("4000000000\n4000000000\n{PLAIN}1 2 3 4\n"), "line 1", "cannot be in the 8 bytes"),
         (format!("18446744073709551615\n9\n{PLAIN}1 2 3 4\n"), "line 1", "copy the file again"),

@@ -159,7 +159,7 @@ fn png(depth: bool, width: u32, height: u32) -> Vec<u8> {
     bytes.into_inner()
 }
 
-const CAMERA: DepthCamera = DepthCamera { fx: 2.0, fy: 4.0, cx: 1.0, cy: 0.5, scale: 1000.0 };
+const CAMERA: DepthCamera = DepthCamera { fx: 2.0, fy: 4.0, cx: 1.0, cy: 0.5, scale: Some(1000.0) };
 
 #[test]
 fn depth_images_of_every_kind() {
@@ -459,7 +459,7 @@ fn real_sweeps() {
 #[test]
 fn a_real_depth_image() {
     let Some(folder) = shared_data() else { return };
-    let camera = DepthCamera { fx: 518.0, fy: 519.0, cx: 325.5, cy: 253.5, scale: 1000.0 };
+    let camera = DepthCamera { fx: 518.0, fy: 519.0, cx: 325.5, cy: 253.5, scale: Some(1000.0) };
     let options = ReadOptions { depth_camera: Some(camera), ..ReadOptions::default() };
     let path = folder.join("sequences/rgbd_kinect/depth_1.pgm");
     let bytes = std::fs::read(&path).unwrap();

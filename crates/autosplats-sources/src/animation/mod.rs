@@ -19,7 +19,6 @@ use std::{path::Path, sync::Arc};
 use autosplats_cloud::{Axes, Contents, Error, Progress};
 use autosplats_formats::ReadOptions;
 use autosplats_scenes::{Scanner, Scanners, Scene, Surface};
-use glam::DVec3;
 
 use self::frames::Frames;
 pub use self::playback::Playback;
@@ -118,11 +117,7 @@ impl Animation {
         let places = (0..cloud.len()).map(|index| cloud.world_position(index)).filter(|place| place.is_finite());
         let bounds = places.map(|place| [place; 2]).reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
         let [low, high] = bounds.ok_or(Error::NoSurface)?;
-        let up = match cloud.axes() {
-            Some(Axes::ZUp) => DVec3::Z,
-            Some(Axes::YUp) | None => DVec3::Y,
-            Some(Axes::Camera) => DVec3::NEG_Y,
-        };
+        let up = cloud.axes().unwrap_or(Axes::YUp).up();
         Ok(Scanner::around(low, high, up, count))
     }
 

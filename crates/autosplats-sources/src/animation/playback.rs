@@ -47,8 +47,8 @@ impl Playback {
         {
             return read;
         }
-        // Notes about one frame hold for all, so only the first frame passes them on.
-        self.frames.read(frame, &FrameProgress { progress, notes: self.last.is_none() })
+        // Notes about one frame hold for all, so only the first frame that can be read passes them on.
+        self.frames.read(frame, &FrameProgress { progress, notes: self.statistics.taken == 0 })
     }
 }
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use autosplats_cloud::{Contents, Error, PointCloud, Progress};
-use autosplats_formats::{ReadOptions, describe, read_mesh, read_with};
+use autosplats_formats::{Description, ReadOptions, describe, read_mesh, read_with};
 use autosplats_scenes::Surface;
 use rayon::prelude::*;
 
@@ -14,6 +14,7 @@ use super::frames::Frames;
 use crate::{
     Timeline,
     listing::{candidates, is_named_as_cloud},
+    stream::or_empty,
 };
 
 /// Files, one per frame.
@@ -32,7 +33,8 @@ impl Sequence {
         let files = clouds(name, found, options)?;
         if files.len() < all {
             let (left_out, frames) = (all - files.len(), files.len());
-            let what = format!("left out {left_out} of {all} files, which are not clouds or have no number");
+            let why = "which are not clouds, are depth images beside clouds, or have no number";
+            let what = format!("left out {left_out} of {all} files, {why}");
             progress.note(&format!("{what}; {frames} are the frames"));
         }
         let timeline = Timeline::even(files.len(), fps)?;
@@ -52,7 +54,8 @@ impl Frames for Sequence {
     }
 
     fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
-        Ok(vec![Arc::new(read_with(&self.files[frame], &self.options, progress)?)])
+        let cloud = or_empty(read_with(&self.files[frame], &self.options, progress))?;
+        Ok(vec![Arc::new(cloud)])
     }
 
     fn surface(&self, frame: usize, progress: &dyn Progress) -> Result<Surface, Error> {
@@ -94,11 +97,16 @@ fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<
     let (mut kept, mut sound, mut reason) = (Vec::new(), false, None);
     for (described, file) in looked {
         match described {
-            Ok(_) => sound = true,
-            Err(Error::UnknownFormat { .. } | Error::Unsupported { .. }) => continue,
-            Err(error) => reason = reason.or(Some(error)),
+            Ok(Description { format, .. }) => {
+                sound = true;
+                kept.push((file, format));
+            }
+            Err(Error::UnknownFormat { .. } | Error::Unsupported { .. }) => {}
+            Err(error) => {
+                reason = reason.or(Some(error));
+                kept.push((file, String::new()));
+            }
         }
-        kept.push(file);
     }
     if !sound {
         return Err(no_frames(match reason {
@@ -107,10 +115,17 @@ fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<
         }));
     }
     // Pose and camera files beside numbered frames may look like text files of points.
-    let numbered =
-        |file: &PathBuf| file.file_stem().is_some_and(|s| s.to_string_lossy().contains(|c: char| c.is_ascii_digit()));
+    let numbered = |(file, _): &(PathBuf, String)| {
+        file.file_stem()
+            .is_some_and(|stem| stem.to_string_lossy().contains(|character: char| character.is_ascii_digit()))
+    };
     if kept.iter().any(numbered) {
         kept.retain(numbered);
     }
-    Ok(kept)
+    // Pictures beside clouds often have a layer of depths. Text beside depth images holds poses.
+    let is_image = |(_, format): &(PathBuf, String)| format.starts_with("depth image");
+    if kept.iter().any(|file| !file.1.is_empty() && file.1 != "text" && !is_image(file)) {
+        kept.retain(|file| !is_image(file));
+    }
+    Ok(kept.into_iter().map(|(file, _)| file).collect())
 }

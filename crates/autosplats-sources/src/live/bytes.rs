@@ -16,7 +16,7 @@ use super::{
     mailbox::Mailbox,
     work::{LiveOptions, UntilAbandoned, guarded, now},
 };
-use crate::Update;
+use crate::{Update, stream::or_empty};
 
 /// Bytes read at a time.
 const READ_BYTES: usize = 1 << 16;
@@ -57,7 +57,7 @@ fn deliver(found: Found, name: &Path, options: &LiveOptions, mailbox: &Mailbox) 
     let error = match found {
         Found::Refused(byte, what) => refused(byte, what),
         Found::File(byte, bytes) => {
-            match guarded(name, || read_bytes(name, &bytes, &options.read, &UntilAbandoned(mailbox))) {
+            match guarded(name, || or_empty(read_bytes(name, &bytes, &options.read, &UntilAbandoned(mailbox)))) {
                 Ok(cloud) => return mailbox.put(Update { channel: 0, stamp: now(), cloud: Arc::new(cloud) }),
                 // A position within a frame needs the offset of the frame.
                 Err(Error::Malformed { place, what, .. }) => refused(byte, format!("in a frame, {place}: {what}")),

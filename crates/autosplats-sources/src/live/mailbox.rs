@@ -13,6 +13,9 @@ use crate::{Next, Statistics, Update};
 /// Time between two checks for cancellation.
 const CHECK_INTERVAL: Duration = Duration::from_millis(20);
 
+/// Most different notes of a stream.
+const MAX_NOTES: usize = 20;
+
 /// The newest update of each channel.
 pub(super) struct Mailbox {
     /// Whether an update stays until it is taken. Otherwise a newer one replaces it.
@@ -27,6 +30,10 @@ struct State {
     /// The last refusal that no caller has seen yet.
     refusal: Option<Error>,
     statistics: Statistics,
+    /// Different notes of the readers.
+    notes: Vec<String>,
+    /// Number of notes that a caller has seen.
+    told: usize,
     /// Bytes of files received, complete or not.
     received: u64,
     ended: bool,
@@ -73,6 +80,14 @@ impl Mailbox {
         self.changed.notify_all();
     }
 
+    /// Passes on what a reader noted, once.
+    pub(super) fn note(&self, note: &str) {
+        let notes = &mut self.state().notes;
+        if notes.len() < MAX_NOTES && notes.iter().all(|known| known != note) {
+            notes.push(note.into());
+        }
+    }
+
     /// Marks the end: no more updates are put.
     pub(super) fn end(&self) {
         self.state().ended = true;
@@ -94,6 +109,8 @@ impl Mailbox {
         let start = Instant::now();
         let mut state = self.state();
         loop {
+            state.notes[state.told..].iter().for_each(|note| progress.note(note));
+            state.told = state.notes.len();
             if let Some(refusal) = state.refusal.take() {
                 self.changed.notify_all();
                 return Err(refusal);

@@ -20,6 +20,7 @@ use super::{
 use crate::{
     Update,
     listing::{is_named_as_cloud, natural},
+    stream::or_empty,
 };
 
 /// Time between two polls. A file that is the same in two consecutive polls counts as complete.
@@ -101,5 +102,5 @@ fn read(file: &FileState, options: &ReadOptions, mailbox: &Mailbox) -> Result<Po
     let path = &file.path;
     check_memory(&path.display().to_string(), file.len)?;
     let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.clone(), source })?;
-    read_bytes(path, &bytes, options, &UntilAbandoned(mailbox))
+    or_empty(read_bytes(path, &bytes, options, &UntilAbandoned(mailbox)))
 }

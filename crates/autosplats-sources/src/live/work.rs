@@ -46,7 +46,7 @@ pub(super) fn now() -> i64 {
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
-/// Cancels once the mailbox is abandoned.
+/// Cancels once the mailbox is abandoned, and passes notes to it.
 pub(super) struct UntilAbandoned<'a>(pub(super) &'a Mailbox);
 
 impl Progress for UntilAbandoned<'_> {
@@ -54,5 +54,9 @@ impl Progress for UntilAbandoned<'_> {
 
     fn cancelled(&self) -> bool {
         self.0.is_abandoned()
+    }
+
+    fn note(&self, note: &str) {
+        self.0.note(note);
     }
 }

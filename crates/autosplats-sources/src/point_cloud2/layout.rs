@@ -48,6 +48,11 @@ impl<'a> Layout<'a> {
         let data = wire.bytes("the points")?;
         let data_at = wire.at() - data.len();
 
+        // A single row may have no height, or a single column no width.
+        let (width, height) = match (width, height) {
+            (points, 0) | (0, points) if step > 0 && points.checked_mul(step) == Some(data.len()) => (points, 1),
+            size => size,
+        };
         let size = width.checked_mul(height).zip(width.checked_mul(step));
         let Some((count, row)) = size.filter(|(count, _)| count.checked_mul(step).is_some()) else {
             return Err(Fault::new(

@@ -81,6 +81,13 @@ pub fn decode(name: &Path, bytes: &[u8], encoding: Encoding, options: &ReadOptio
     };
     // A cloud may end up empty: a sensor may see nothing for a while.
     let no_returns = cloud.drop_no_returns(|_| !options.keep_no_returns);
+    // The classes of a robot are not those of LAS, so that the usual filter keeps all.
+    if let Some(filter) = options.keep.as_ref().filter(|filter| !filter.is_usual() && !cloud.is_empty()) {
+        if let Some(missing) = filter.missing_field(&cloud) {
+            return Err(Error::malformed(name, place, format!("--keep {filter}: its points have no field {missing}")));
+        }
+        cloud.keep(filter);
+    }
     let axes = if frame_id.contains("optical") { Axes::Camera } else { Axes::ZUp };
     let mut cloud = cloud.with_axes(axes);
     if !MAP_FRAMES.contains(&&*frame_id.to_lowercase()) && !cloud.is_empty() {

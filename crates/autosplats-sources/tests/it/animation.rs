@@ -90,6 +90,21 @@ fn depth_images_are_frames_and_what_lies_beside_them_is_not() {
 }
 
 #[test]
+fn depth_images_beside_clouds_are_no_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    let pfm = [b"Pf\n2 2\n-1.0\n".to_vec(), [1.0_f32; 4].map(f32::to_le_bytes).concat()].concat();
+    for index in 0..3 {
+        let path = |end: &str| folder.path().join(format!("{index}.{end}"));
+        write(&PointCloud::new(DVec3::ZERO, positions(10)), &path("ply"), &()).unwrap();
+        std::fs::write(path("pfm"), &pfm).unwrap();
+    }
+    let name = folder.path().to_str().unwrap();
+    assert_eq!(sequence(name).unwrap().timeline().len(), 3, "the clouds");
+    (0..3).for_each(|index| std::fs::remove_file(folder.path().join(format!("{index}.ply"))).unwrap());
+    assert_eq!(sequence(name).unwrap().timeline().len(), 3, "the images, alone");
+}
+
+#[test]
 fn folders_without_a_readable_frame_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().to_str().unwrap();

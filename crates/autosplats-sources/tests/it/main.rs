@@ -4,6 +4,7 @@
 
 mod animation;
 mod common;
+mod first_points;
 mod interop;
 mod latest;
 mod live;

@@ -219,6 +219,17 @@ fn messages_without_points_are_clouds_without_points() {
 }
 
 #[test]
+fn points_of_no_height_or_width_are_one_row() {
+    let mut message = Cloud2::xyz(&positions(12), 16);
+    for (width, height) in [(12, 0), (0, 12), (1, 12), (12, 1), (3, 4)] {
+        (message.width, message.height) = (width, height);
+        assert_eq!(cloud(&message).positions(), positions(12), "{width} × {height}");
+    }
+    (message.width, message.height) = (11, 0);
+    assert!(cloud(&message).is_empty(), "a buffer that is not cleared");
+}
+
+#[test]
 fn frames_tell_who_saw_the_points_and_which_way_is_up() {
     let with = |frame: &str| {
         let message = Cloud2 { frame: frame.into(), ..Cloud2::xyz(&positions(3), 12) };

@@ -26,6 +26,7 @@ impl App {
             Action::Open(input) => session.open(input),
             Action::OpenAgain(kept) => session.open_again(kept),
             Action::Reload(id) => session.reload_layer(id),
+            Action::Keep(id, filter) => session.keep(id, filter),
             Action::GiveUpWaiting(number) => session.playing.give_up(number),
             Action::Remove(ids) => self.remove(ids),
             Action::RemoveEdited(ids) => session.remove(&ids),
@@ -130,7 +131,7 @@ impl App {
                 ui.tools.current = Tool::Navigate;
             }
             Command::HideSelected => session.edit_points("Hide", |document| document.hide_selected()),
-            Command::ShowAll => session.edit_points("Show", |document| document.show_all()),
+            Command::ShowAll => session.show_all(),
             Command::DeleteSelected => session.edit_points("Delete", |document| document.delete_selected()),
             Command::CropToSelected => session.edit_points("Crop away", |document| document.crop_to_selection()),
             Command::Clip => match session.switch_clip() {

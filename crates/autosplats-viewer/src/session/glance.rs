@@ -7,7 +7,7 @@ use autosplats::cloud::glam::DVec3;
 use autosplats::cloud::{Axes, PointCloud};
 use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 
-use crate::session::document::bounds_of;
+use crate::session::document::{Bits, bounds_of};
 use crate::session::{Document, Input, Layer};
 
 /// What the first view depends on besides the points.
@@ -54,11 +54,12 @@ pub(crate) struct FirstLook {
 }
 
 impl FirstLook {
-    /// Examines the points of an input.
-    pub(crate) fn of(input: &Input, cloud: &Arc<PointCloud>, frame: ViewFrame) -> Self {
+    /// Examines the points of an input, of which some are hidden.
+    pub(crate) fn of(input: &Input, cloud: &Arc<PointCloud>, hidden: &Bits, frame: ViewFrame) -> Self {
         let axes = guess_axes(cloud);
         let mut alone = Document::default();
-        alone.add(Layer::new(&*input.name, None, Arc::clone(cloud)).opened_at(input.world_from_input));
+        let id = alone.add(Layer::new(&*input.name, None, Arc::clone(cloud)).opened_at(input.world_from_input));
+        alone.set_hidden(id, hidden);
         let overview = alone.overview();
         let projection = Projection::PerspectiveFovDeg(Projection::USUAL_FOV_DEG);
         let up = frame.up.unwrap_or(axes);

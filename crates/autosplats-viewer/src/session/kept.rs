@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use autosplats::cloud::Error;
 use autosplats::cloud::glam::DMat4;
+use autosplats::cloud::{Error, PointFilter};
 use autosplats_formats::{DepthCamera, ReadOptions};
 use autosplats_sources::{LatestOptions, PlayOptions, Source};
 use serde::{Deserialize, Serialize};
@@ -38,6 +38,9 @@ struct StoredReadOptions {
     columns: Option<Vec<String>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     depth_camera: Option<DepthCamera>,
+    /// Words of the filter of points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    keep: Option<String>,
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     keep_no_returns: bool,
 }
@@ -101,6 +104,9 @@ impl StoredInput {
 
     /// Why the stored values are invalid; `None` if they are valid.
     pub(crate) fn problem(&self) -> Option<String> {
+        if let Some(Err(error)) = self.options.keep.as_ref().map(|words| words.parse::<PointFilter>()) {
+            return Some(format!("{}: keep: {error}", self.source));
+        }
         let decay = self.play.decay?;
         let wrong = Duration::try_from_secs_f64(decay).is_err();
         wrong.then(|| format!("{}: decay is a number of seconds, not {decay}", self.source))
@@ -125,8 +131,8 @@ impl StoredInput {
 
 impl StoredReadOptions {
     fn of(options: &ReadOptions) -> Self {
-        let ReadOptions { keep_no_returns, columns, depth_camera, .. } = options.clone();
-        Self { columns, depth_camera, keep_no_returns }
+        let ReadOptions { keep_no_returns, columns, depth_camera, keep, .. } = options.clone();
+        Self { columns, depth_camera, keep: keep.map(|filter| filter.to_string()), keep_no_returns }
     }
 
     /// Whether all values are defaults.
@@ -135,8 +141,9 @@ impl StoredReadOptions {
     }
 
     fn options(self) -> ReadOptions {
-        let Self { columns, depth_camera, keep_no_returns } = self;
-        ReadOptions { columns, depth_camera, keep_no_returns, ..ReadOptions::default() }
+        let Self { columns, depth_camera, keep, keep_no_returns } = self;
+        let keep = keep.and_then(|words| words.parse().ok());
+        ReadOptions { columns, depth_camera, keep, keep_no_returns, ..ReadOptions::default() }
     }
 }
 
@@ -185,9 +192,10 @@ mod tests {
 
     /// An input with all values set.
     fn told() -> Input {
-        let depth_camera = Some(DepthCamera { fx: 525.0, fy: 525.5, cx: 319.5, cy: 239.5, scale: 5000.0 });
+        let depth_camera = Some(DepthCamera { fx: 525.0, fy: 525.5, cx: 319.5, cy: 239.5, scale: Some(5000.0) });
         let columns = Some(vec!["x".into(), "-".into(), "y".into()]);
-        let options = ReadOptions { columns, depth_camera, keep_no_returns: true, ..ReadOptions::default() };
+        let keep = "ground,-withheld".parse().ok();
+        let options = ReadOptions { columns, depth_camera, keep, keep_no_returns: true, ..ReadOptions::default() };
         let latest = LatestOptions { decay: Some(Duration::from_millis(250)), ..LatestOptions::default() };
         let play = PlayOptions {
             fps: Some(12.5),
@@ -221,6 +229,7 @@ mod tests {
             (options.columns, options.depth_camera, true),
             "and read"
         );
+        assert_eq!(input.options.keep, options.keep, "the same points");
         let all = PlayOptions { latest: LatestOptions { accumulate: true, ..LatestOptions::default() }, ..play };
         let (all, _) = StoredInput::of(&Input { play: all, ..told() }, appearance).open(Path::new("")).expect("a file");
         assert!(all.play.latest.accumulate && all.play.latest.decay.is_none(), "all that came is kept");
@@ -240,9 +249,9 @@ mod tests {
     }
 
     #[test]
-    fn a_decay_that_is_no_time_is_told() {
-        for decay in ["-1", "1e300"] {
-            let text = format!(r#"{{"source": "drive.mcap", "play": {{"decay": {decay}}}}}"#);
+    fn values_that_mean_nothing_are_told() {
+        for wrong in [r#""play": {"decay": -1}"#, r#""play": {"decay": 1e300}"#, r#""options": {"keep": "grond"}"#] {
+            let text = format!(r#"{{"source": "drive.mcap", {wrong}}}"#);
             let kept: StoredInput = serde_json::from_str(&text).expect("it can be read");
             assert!(kept.problem().is_some_and(|problem| problem.contains("drive.mcap")), "{text}");
         }

@@ -7,10 +7,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use autosplats::cloud::glam::DMat4;
-use autosplats::cloud::{Error, PointCloud, Progress};
-use autosplats_formats::ReadOptions;
+use autosplats::cloud::{Error, LeftOut, PointCloud, PointFilter, Progress};
+use autosplats_formats::{ReadOptions, read_marked};
+use autosplats_sources::Source;
 use eframe::egui;
 
+use crate::session::document::Bits;
 use crate::session::{FirstLook, Input, SharedViewFrame, ViewFrame};
 use crate::threads::spawn;
 
@@ -27,8 +29,8 @@ pub(crate) struct JobId(u64);
 pub(crate) enum JobNews {
     /// Part of the points, shown until all have arrived.
     Preview(Arc<PointCloud>, FirstLook),
-    /// All points, and the reader's notes.
-    Read(Arc<PointCloud>, FirstLook, Vec<String>),
+    /// All points, the reader's notes, and the points to hide.
+    Read(Arc<PointCloud>, FirstLook, Vec<String>, Bits),
     /// Why reading failed.
     Failed(String),
     /// The job was cancelled.
@@ -45,7 +47,7 @@ pub(crate) struct Job {
 /// State shared by the reader and the window.
 #[derive(Default)]
 struct State {
-    /// Progress, in 65,536ths.
+    /// Progress, 0 to 1, as the bits of an `f32`.
     done: AtomicU32,
     cancelled: AtomicBool,
 }
@@ -53,7 +55,7 @@ struct State {
 impl Job {
     /// Progress, 0 to 1.
     pub(crate) fn fraction(&self) -> f32 {
-        self.state.done.load(Ordering::Relaxed) as f32 / 65_536.0
+        f32::from_bits(self.state.done.load(Ordering::Relaxed))
     }
 
     /// Cancels the job; the reader stops at its next check.
@@ -190,23 +192,42 @@ pub(crate) struct Watch {
     _alive: Arc<()>,
 }
 
+/// How the window reads an input: with all digits, for export, and without noise unless the user has said otherwise.
+pub(crate) fn read_options(input: &Input) -> ReadOptions {
+    let keep = input.options.keep.clone().or_else(|| Some(PointFilter::usual()));
+    ReadOptions { exact: true, keep, ..input.options.clone() }
+}
+
 fn read(order: &Order, frame: &SharedViewFrame, sender: &Sender<(JobId, JobNews)>, context: &egui::Context) -> JobNews {
     if order.state.cancelled.load(Ordering::Relaxed) {
         return JobNews::Cancelled;
     }
     let follower = Follower { order, frame, sender, context, notes: Mutex::default(), preview: Mutex::default() };
-    let options = ReadOptions { exact: true, ..order.input.options.clone() };
-    match order.input.source.read(&options, &follower) {
-        Ok(cloud) if cloud.is_empty() => JobNews::Failed(format!("{}: there are no points in it", order.input.name)),
-        Ok(cloud) => {
+    let options = read_options(&order.input);
+    let read = match &order.input.source {
+        // What is left out is hidden, so that an export of the whole file still has it.
+        Source::File(path) => read_marked(path, &options, &follower),
+        source => source.read(&options, &follower).map(|cloud| (cloud, LeftOut::default())),
+    };
+    match read {
+        Ok((cloud, _)) if cloud.is_empty() => {
+            JobNews::Failed(format!("{}: there are no points in it", order.input.name))
+        }
+        Ok((cloud, left)) => {
+            let hidden = if left.count() == 0 { Bits::default() } else { Bits::from_fn(cloud.len(), |i| left.has(i)) };
             let notes = follower.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
             let cloud = Arc::new(cloud);
-            let glance = FirstLook::of(&order.input, &cloud, frame.get());
-            JobNews::Read(cloud, glance, notes)
+            let glance = FirstLook::of(&order.input, &cloud, &hidden, frame.get());
+            JobNews::Read(cloud, glance, notes, hidden)
         }
         Err(Error::Cancelled) => JobNews::Cancelled,
         Err(error) => JobNews::Failed(error.to_string()),
     }
+}
+
+/// Whether a progress bar 100 pixels long moves: it needs 100 repaints.
+pub(super) fn moves_bar(before: f32, now: f32) -> bool {
+    (100.0 * before) as u32 != (100.0 * now) as u32
 }
 
 /// Receives progress, notes and points from a reader.
@@ -260,10 +281,9 @@ impl Preview {
 
 impl Progress for Follower<'_> {
     fn report(&self, fraction: f32) {
-        let done = (fraction.clamp(0.0, 1.0) * 65_536.0) as u32;
-        let before = self.order.state.done.swap(done, Ordering::Relaxed);
-        // A progress bar 100 pixels long needs 100 repaints.
-        if before / 656 != done / 656 {
+        let done = fraction.clamp(0.0, 1.0);
+        let before = f32::from_bits(self.order.state.done.swap(done.to_bits(), Ordering::Relaxed));
+        if moves_bar(before, done) {
             self.context.request_repaint();
         }
     }
@@ -284,7 +304,7 @@ impl Progress for Follower<'_> {
         let mut preview = self.preview.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(cloud) = preview.add(points) {
             let cloud = Arc::new(cloud);
-            let glance = FirstLook::of(&self.order.input, &cloud, self.frame.get());
+            let glance = FirstLook::of(&self.order.input, &cloud, &Bits::default(), self.frame.get());
             let _ = self.sender.send((self.order.id, JobNews::Preview(cloud, glance)));
             self.context.request_repaint();
         }

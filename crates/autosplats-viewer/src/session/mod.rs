@@ -26,7 +26,7 @@ pub(crate) use self::document::{
 pub(crate) use self::editing::CachedCounts;
 pub(crate) use self::glance::{FirstLook, SharedViewFrame, ViewFrame};
 pub(crate) use self::kept::StoredInput;
-pub(crate) use self::loading::{JobId, JobNews, Loader, Watch};
+pub(crate) use self::loading::{JobId, JobNews, Loader, Watch, read_options};
 pub(crate) use self::measure::Ruler;
 pub(crate) use self::opening::{Arrival, JobTarget};
 pub(crate) use self::playing::{Clock, Playing, Reel, SPEEDS, WaitingInput};
@@ -104,23 +104,18 @@ impl Session {
         self.up_axis.or(self.guessed_axes).unwrap_or(Axes::ZUp)
     }
 
-    /// Chooses the next up axis: as guessed, then Z, Y, and -Y.
+    /// Chooses the next up axis: as guessed, then Z, Y, X, -Z, -Y, -X, and a camera's frame.
     pub(crate) fn change_up_axis(&mut self) {
-        self.up_axis = match self.up_axis {
-            None => Some(Axes::ZUp),
-            Some(Axes::ZUp) => Some(Axes::YUp),
-            Some(Axes::YUp) => Some(Axes::Camera),
-            Some(Axes::Camera) => None,
+        let next = match self.up_axis {
+            None => 0,
+            Some(axes) => Axes::ALL.iter().take_while(|&&other| other != axes).count() + 1,
         };
+        self.up_axis = Axes::ALL.get(next).copied();
     }
 
     /// Unit vector upward, world space.
     pub(crate) fn up(&self) -> DVec3 {
-        match self.axes() {
-            Axes::ZUp => DVec3::Z,
-            Axes::YUp => DVec3::Y,
-            Axes::Camera => DVec3::NEG_Y,
-        }
+        self.axes().up()
     }
 
     /// A ruler in the units of the first layer.

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use autosplats::cloud::PointCloud;
+use autosplats::cloud::{PointCloud, PointFilter};
 use autosplats_sources::Source;
 
+use crate::session::document::Bits;
 use crate::session::{Appearance, FirstLook, Input, JobId, JobNews, Layer, LayerId, Session, StoredInput};
 
 /// Number of recent inputs kept.
@@ -100,14 +101,17 @@ impl Session {
                         self.examined(id, glance);
                     }
                 }
-                JobNews::Read(cloud, glance, notes) => {
+                JobNews::Read(cloud, glance, notes, hidden) => {
                     notes.into_iter().for_each(|note| self.messages.note(format!("{}: {note}", input.name)));
                     if let Some(id) = again {
                         self.jobs.remove(&job);
-                        self.read_again(&input, id, &cloud, glance);
+                        self.read_again(&input, id, &cloud, glance, &hidden);
                     } else if let Some(id) = self.fill_layer(&input, job, &cloud) {
                         self.jobs.remove(&job);
-                        self.settle(|document| document.complete(id));
+                        self.settle(|document| {
+                            document.complete(id);
+                            document.set_hidden(id, &hidden);
+                        });
                         self.examined(id, glance);
                     }
                 }
@@ -245,7 +249,7 @@ impl Session {
     }
 
     /// Shows the new points of a file. Edits made meanwhile apply to the old points, so that the new ones are dropped.
-    fn read_again(&mut self, input: &Input, id: LayerId, cloud: &Arc<PointCloud>, glance: FirstLook) {
+    fn read_again(&mut self, input: &Input, id: LayerId, cloud: &Arc<PointCloud>, glance: FirstLook, hidden: &Bits) {
         if self.history.is_unsaved(id) {
             self.messages.note(format!(
                 "{} has changed; its new points are not shown, because it has unsaved edits",
@@ -253,6 +257,8 @@ impl Session {
             ));
         } else if self.document().layer(id).is_some() {
             self.fill(id, cloud);
+            self.settle(|document| document.set_hidden(id, hidden));
+            self.inputs.insert(id, input.clone());
             self.messages.note(format!("{} was read again", input.name));
             self.examined(id, glance);
         }
@@ -269,13 +275,46 @@ impl Session {
     /// Reads the input of a layer again. A layer with unsaved edits is kept, with a note, since the edits apply to the
     /// old points.
     pub(crate) fn reload_layer(&mut self, id: LayerId) {
-        let Some(input) = self.inputs.get(&id).cloned() else { return };
+        if let Some(input) = self.inputs.get(&id).cloned() {
+            self.read_anew(id, input);
+        }
+    }
+
+    /// Chooses which points of a layer are shown. All points are shown at once; for any other choice the input is read
+    /// again.
+    pub(crate) fn keep(&mut self, id: LayerId, filter: PointFilter) {
+        let Some(input) = self.inputs.get_mut(&id) else { return };
+        if filter.is_all() && !input.moves() {
+            input.options.keep = Some(filter);
+            self.settle(|document| document.set_hidden(id, &Bits::default()));
+            return;
+        }
+        let mut input = input.clone();
+        input.options.keep = Some(filter);
+        self.read_anew(id, input);
+    }
+
+    /// Shows all hidden points as an undo step. A session remembers that nothing is left out.
+    pub(crate) fn show_all(&mut self) {
+        let hiding = self.document().layers.iter().filter(|layer| !layer.edits.hidden.is_empty());
+        let ids: Vec<LayerId> = hiding.map(|layer| layer.id).collect();
+        for id in ids {
+            if let Some(input) = self.inputs.get_mut(&id) {
+                input.options.keep = Some(PointFilter::all());
+            }
+        }
+        self.edit_points("Show", |document| document.show_all());
+    }
+
+    /// Reads a layer from an input that differs from its own in options.
+    fn read_anew(&mut self, id: LayerId, input: Input) {
         if self.history.is_unsaved(id) {
             self.messages
                 .note(format!("{} has changed; it was not read again, because it has unsaved edits", input.name));
             return;
         }
         if input.moves() {
+            self.inputs.insert(id, input.clone());
             self.play_anew(id, input);
             return;
         }

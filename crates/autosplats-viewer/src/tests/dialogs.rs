@@ -125,7 +125,7 @@ fn a_name_that_cannot_be_written_is_told_in_place() {
     for (command, name, why) in [
         (Command::Export, "points.unknown", "unknown output format"),
         (Command::Screenshot, "picture.bmp", "The name has to end in .png"),
-        (Command::Film, "film.bmp", "The name has to end in .png, .mp4"),
+        (Command::Film, "film.bmp", "The name has to end in .png, .jpg, .mp4"),
         (Command::SaveState, "", "This is a folder"),
     ] {
         ask(&mut window, command, &folder.path().join(name));

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use autosplats::Camera;
+use autosplats::cloud::glam::DVec3;
+use autosplats::cloud::{FieldValues, PointCloud};
 
 use super::*;
 use crate::session::StoredInput;
@@ -146,4 +148,43 @@ fn settings_are_kept_between_starts() {
     window.harness.state_mut().view.look.settings.reconstruction.k = 100_000;
     storage::save(&window.app().session, &window.app().view, &mut memory);
     assert_eq!(storage::load(Some(&memory)).0, Look::default(), "k of 100,000 is out of range");
+}
+
+#[test]
+fn noise_is_hidden_and_comes_back_with_a_click() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let path = folder.path().join("wall.las");
+    let wall = (0..1000).map(|i| [(i % 40) as f32, 0.0, (i / 40) as f32]);
+    let noise = (0..50).map(|i| [(i % 5) as f32, 0.0, 9000.0 + (i / 5) as f32]);
+    let classes = (0..1050).map(|i| if i < 1000 { 2 } else { 7 }).collect();
+    let cloud = PointCloud::new(DVec3::ZERO, wall.chain(noise).collect());
+    let cloud = cloud.with_field("Classification", FieldValues::U8(classes)).expect("a class each");
+    autosplats_formats::write(&cloud, &path, &()).expect("it can be written");
+    let mut window = Window::new(&[&*path.display().to_string()]);
+    window.settle();
+    let shown = |window: &Window| window.app().view.shot.as_ref().expect("there is a picture").shown.len();
+    let share = window.app().view.shot.as_ref().map_or(0, |shot| shot.counts.covered) as f32 / window.picture().area();
+    assert!(share > 0.05, "the camera sees the wall, not the noise: {share}");
+    assert_eq!(window.app().session.document().layers[0].cloud.len(), 1050, "an export has all points");
+    assert_eq!(shown(&window), 1000, "noise is not drawn");
+    assert!(window.says("left out 50 of 1050 points: 50 low noise (class 7)"), "told: {:?}", window.words());
+    assert!(window.says("50 hidden"), "beside the name too");
+
+    window.click_on("Show");
+    window.settle();
+    assert_eq!(shown(&window), 1050, "a click brings them back");
+    let id = window.app().session.document().layers[0].id;
+    let kept = |window: &Window| {
+        let input = &window.app().session.inputs[&id];
+        let text = serde_json::to_string(&StoredInput::of(input, crate::session::Appearance::default()));
+        text.expect("it can be written")
+    };
+    assert!(kept(&window).contains(r#""keep":"all""#), "a session remembers: {}", kept(&window));
+    for (words, points) in [("usual", 1000), ("noise", 50), ("road", 50), ("-noise", 1000)] {
+        window.harness.state_mut().session.keep(id, words.parse().expect("a filter"));
+        window.settle();
+        assert_eq!(shown(&window), points, "{words}");
+    }
+    assert!(window.says("--keep road leaves none"), "what leaves nothing changes nothing: {:?}", window.words());
+    assert!(kept(&window).contains(r#""keep":"-noise""#), "the last: {}", kept(&window));
 }

@@ -159,7 +159,7 @@ fn check(window: &mut Window, command: Command) {
         Command::Projection => assert_ne!(app.view.navigation.is_orthographic(), orthographic, "the other projection"),
         Command::UpAxis => {
             assert_eq!(app.session.up_axis, Some(Axes::ZUp), "first Z");
-            for axes in [Some(Axes::YUp), Some(Axes::Camera), None] {
+            for axes in Axes::ALL[1..].iter().copied().map(Some).chain([None]) {
                 give(window, command);
                 assert_eq!(window.app().session.up_axis, axes, "then the next");
             }

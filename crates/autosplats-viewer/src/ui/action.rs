@@ -1,6 +1,7 @@
 //! What keys, panels and dialogs ask for. The application performs it.
 
 use autosplats::Camera;
+use autosplats::cloud::PointFilter;
 use autosplats::cloud::glam::{DMat4, DVec3};
 
 use crate::session::{ClipBox, Clock, Document, Input, LayerId, StoredInput};
@@ -15,6 +16,8 @@ pub(crate) enum Action {
     OpenAgain(StoredInput),
     /// Reads the input of a layer again.
     Reload(LayerId),
+    /// Chooses which points of a layer are shown.
+    Keep(LayerId, PointFilter),
     /// Stops an input that has no points yet, by its number among the playing ones.
     GiveUpWaiting(usize),
     /// Removes layers, after a question if they have unsaved edits.

@@ -290,7 +290,7 @@ impl Command {
             Self::View(_) => "Look from this side, at a distance that shows everything",
             Self::OppositeView => "Look from the opposite side",
             Self::Projection => "Switch between perspective and orthographic projection",
-            Self::UpAxis => "Next up axis: as guessed, Z, Y, or -Y as in a camera's coordinates",
+            Self::UpAxis => "Next up axis: as guessed, Z, Y, X, -Z, -Y, -X, or a camera's coordinates",
             Self::Level => "Make the horizon level",
             Self::CopyView => "Copy the camera as JSON, for 'render --camera'",
             Self::PasteView => "Move to a copied camera",

@@ -97,8 +97,12 @@ fn ticks(low: f64, high: f64, most: f64) -> Vec<(f64, String)> {
         (steps - steps.round()).abs() < 1e-6 * steps
     });
     let largest = low.abs().max(high.abs());
+    // Values that differ in their last digits only are written with all of them.
+    let close = step * 1e3 < largest && largest < 1e15;
     let label = |value: f64| match decimals {
-        Some(decimals) if largest < 1e9 && step >= 1e-6 => format!("{value:.*}", decimals.unsigned_abs() as usize),
+        Some(decimals) if close || largest < 1e9 && step >= 1e-6 => {
+            format!("{value:.*}", decimals.unsigned_abs() as usize)
+        }
         _ => format!("{value:.3e}"),
     };
     // Adding zero turns -0 into 0.
@@ -117,6 +121,8 @@ mod tests {
         assert_eq!(labels(-1.3, 2.2, 4.0), ["-1", "0", "1", "2"], "across zero");
         assert_eq!(labels(406_123.25, 406_123.75, 5.0).first().map(String::as_str), Some("406123.3"), "far from zero");
         assert_eq!(labels(7.0, 7.0, 5.0), ["7.0000"], "one value");
+        let seconds = labels(1.7e9 + 3.0, 1.7e9 + 21.0, 3.0);
+        assert_eq!(seconds, ["1700000010", "1700000020"], "seconds of an era");
         for (low, high) in [(0.001, 0.0037), (-5.0, 1e6), (1e-9, 3e-9), (99.5, 101.0)] {
             let found = ticks(low, high, 8.0);
             assert!((3..=9).contains(&found.len()), "{low} to {high}: {found:?}");

@@ -120,7 +120,7 @@ impl Navigation {
     /// Sets the ball around the scene, by its middle and radius, and the up direction.
     pub(crate) fn set_scene(&mut self, middle: DVec3, radius: f64, up: DVec3) {
         if middle.is_finite() && radius.is_finite() {
-            self.scene = (middle, radius.max(1e-9));
+            self.scene = (middle, if radius > 0.0 { radius } else { 1e-9 });
         }
         self.up = up.try_normalize().unwrap_or(DVec3::Z);
     }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use autosplats::Image;
+use autosplats_output::{PictureFormat, write_picture};
 
 use super::View;
 use crate::files;
@@ -10,7 +11,7 @@ use crate::threads::spawn;
 use crate::view::{Goal, Task};
 
 impl View {
-    /// Hands a picture to its goal. `range` is the value range of its colours.
+    /// Hands a picture to its goal. `range` holds the ends of its colour map.
     pub(crate) fn photographed(&mut self, picture: Image, range: Option<[f64; 2]>, goal: Goal) {
         match goal {
             Goal::File(path) => self.save_picture(picture, path),
@@ -27,7 +28,8 @@ impl View {
     pub(crate) fn save_picture(&self, picture: Image, path: PathBuf) {
         let messages = self.messages.clone();
         spawn("picture", move || {
-            let written = files::write(&path, |writer| autosplats_output::write_png(&picture, true, writer));
+            let format = PictureFormat::of(&path).unwrap_or(PictureFormat::Png);
+            let written = files::write(&path, |writer| write_picture(&picture, format, true, writer));
             messages.result(match written {
                 Ok(()) => Ok(format!("{} was written", path.display())),
                 Err(error) => Err(format!("{}: {error}", path.display())),

@@ -2,14 +2,14 @@
 //!
 //! # How it works
 //! The render thread is asked for one picture at a time, so that the window stays usable. A thread of its own writes
-//! the pictures as PNG files, or sends them to ffmpeg for a film. Everything stays as at the start of the film, except
+//! the pictures as files, or sends them to ffmpeg for a film. Everything stays as at the start of the film, except
 //! the camera and, where time runs, the points that a [`Reel`] reads.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use autosplats::{Camera, Image};
-use autosplats_output::{Film, Frames, Target, write_png};
+use autosplats_output::{Film, Frames, Target, write_picture};
 use eframe::egui;
 
 use crate::files;
@@ -105,12 +105,11 @@ impl Recording {
         Ok(Some(self.wish.clone()))
     }
 
-    /// Takes a finished picture and the value range of its colours.
+    /// Takes a finished picture and the ends of its colour map.
     pub(crate) fn arrived(&mut self, image: Image, range: Option<[f64; 2]>) {
         self.asked = false;
         if self.next == 1 {
             // All pictures keep the range of the first one.
-            let range = range.map(|ends| ends.map(|end| end as f32)).filter(|[low, high]| low < high);
             let known = &mut self.wish.settings.shading.range;
             *known = known.or(range);
         }
@@ -147,7 +146,7 @@ fn write_frames(
     let mut count = 0;
     for image in queue {
         let path = frames.file(count);
-        files::write(&path, |writer| write_png(&image, true, writer))
+        files::write(&path, |writer| write_picture(&image, frames.format(), true, writer))
             .map_err(|error| format!("{}: {error}", path.display()))?;
         count += 1;
         context.request_repaint();

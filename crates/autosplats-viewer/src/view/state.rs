@@ -28,15 +28,23 @@ pub(crate) struct State {
     clock: Option<Clock>,
 }
 
-/// The up axis.
+/// The up axis, stored as its name.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-enum Up {
-    #[serde(rename = "z_up")]
-    Z,
-    #[serde(rename = "y_up")]
-    Y,
-    #[serde(rename = "camera")]
-    Camera,
+#[serde(try_from = "String", into = "String")]
+struct Up(Axes);
+
+impl TryFrom<String> for Up {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        Axes::from_name(&name).map(Self).ok_or_else(|| format!("no axes are called '{name}'"))
+    }
+}
+
+impl From<Up> for String {
+    fn from(Up(axes): Up) -> Self {
+        axes.name().into()
+    }
 }
 
 impl State {
@@ -52,16 +60,11 @@ impl State {
         // Points from a pipe cannot be read again.
         let again = |kept: &StoredInput| !matches!(Source::parse(&kept.source), Ok(Source::StandardInput));
         let inputs: Vec<StoredInput> = layers.chain(absent).filter(again).collect();
-        let up = session.up_axis.map(|axes| match axes {
-            Axes::ZUp => Up::Z,
-            Axes::YUp => Up::Y,
-            Axes::Camera => Up::Camera,
-        });
         Self {
             camera: (!inputs.is_empty()).then(|| view.navigation.goal_camera()),
             clock: inputs.iter().any(StoredInput::moves).then(|| session.playing.clock.clone()),
             inputs,
-            up,
+            up: session.up_axis.map(Up),
             look: view.look.clone(),
             keys: view.keys.clone(),
             clip: session.document().clip,
@@ -73,7 +76,7 @@ impl State {
     /// # Errors
     /// A message with the file's name and what is wrong.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let text = autosplats::cloud::read_text(path).map_err(|error| format!("{}: {error}", path.display()))?;
         // Only an object is accepted: an empty list would deserialize as a session of defaults.
         let state = serde_json::from_str::<serde_json::Map<_, _>>(&text)
             .and_then(|fields| serde_json::from_value::<Self>(fields.into()))
@@ -111,11 +114,7 @@ impl State {
         let Self { inputs, camera, up, look, keys, clip, clock } = self;
         view.look = look;
         view.keys = keys;
-        session.up_axis = up.map(|up| match up {
-            Up::Z => Axes::ZUp,
-            Up::Y => Axes::YUp,
-            Up::Camera => Axes::Camera,
-        });
+        session.up_axis = up.map(|Up(axes)| axes);
         if clip.is_some() {
             session.settle(|document| document.clip = clip);
         }
@@ -149,6 +148,7 @@ pub(crate) fn folder(path: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use autosplats::Background;
     use autosplats::cloud::glam::{DMat4, DQuat, DVec3};
     use autosplats_formats::ReadOptions;
 
@@ -164,10 +164,10 @@ mod tests {
         let clip = ClipBox { rotation: DQuat::from_rotation_z(0.7), ..ClipBox::new(DVec3::ZERO, DVec3::ONE) };
         let mut clock = Clock::default();
         (clock.speed, clock.looped) = (0.25, false);
-        let state = State { inputs, up: Some(Up::Y), clip: Some(clip), clock: Some(clock), ..State::default() };
+        let state = State { inputs, up: Some(Up(Axes::YUp)), clip: Some(clip), clock: Some(clock), ..State::default() };
         state.write(&path).expect("written");
         assert_eq!(State::read(&path), Ok(state), "as it was");
-        let older = r#"{"inputs": [{"source": "a.ply"}], "camera": null, "up": "z_up", "keys": []}"#;
+        let older = r#"{"inputs": [{"source": "a.ply"}], "camera": null, "up": "z-up", "keys": []}"#;
         std::fs::write(&path, older).expect("written");
         let read = State::read(&path).expect("a file from before there were boxes, options and clocks");
         assert_eq!((read.clip, read.clock), (None, None), "none were told");
@@ -224,6 +224,7 @@ mod tests {
             "{\"inputs\": 3}",
             "{\"unknown\": 1}",
             "{\"look\": {\"settings\": {\"reconstruction\": {\"k\": 0}}}}",
+            "{\"look\": {\"settings\": {\"shading\": {\"background\": \"whit\"}}}}",
             "{\"inputs\": [{\"source\": \"a\", \"options\": {\"colums\": []}}]}",
             "{\"inputs\": [{\"source\": \"a\", \"play\": {\"topic\": []}}]}",
             "{\"inputs\": [{\"source\": \"a\", \"play\": {\"decay\": -2}}]}",
@@ -236,5 +237,21 @@ mod tests {
             assert!(error.contains("state.json"), "names the file: {error}");
         }
         assert!(State::read(&folder.path().join("none.json")).is_err(), "no file");
+    }
+
+    #[test]
+    fn backgrounds_may_be_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("state.json");
+        let background = |text: &str| {
+            let text = format!("{{\"look\": {{\"settings\": {{\"shading\": {{\"background\": {text}}}}}}}}}");
+            std::fs::write(&path, text).expect("written");
+            State::read(&path).expect("a state").look.settings.shading.background
+        };
+        assert_eq!(background("\"white\""), Background::Color([255; 3]), "as the command line names it");
+        assert_eq!(background("{\"gradient\": [[1, 2, 3], [4, 5, 6]]}"), Background::Gradient([1, 2, 3], [4, 5, 6]));
+        for kept in [Background::Transparent, Background::Color([7; 3]), Background::Gradient([1; 3], [2; 3])] {
+            assert_eq!(background(&serde_json::to_string(&kept).expect("JSON")), kept, "as it is written");
+        }
     }
 }

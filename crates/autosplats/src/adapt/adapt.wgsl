@@ -152,12 +152,12 @@ fn moved_onto(surfel: Surfel, surface: Surface, noise: f32, known: KnownNoise) -
     return out;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let active_points = atomicLoad(&counters[ACTIVE]);
     let first_of_round = select(0u, active_points, ROUND == 1u);
     let len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
-    let index = group_index(workgroup) * 64u + local;
+    let index = group_index(workgroup) * SMALL_GROUP + local;
     if index >= len {
         return;
     }

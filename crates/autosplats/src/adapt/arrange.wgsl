@@ -43,7 +43,7 @@ fn arrange() {
         let cells = select(0u, level.columns * level.rows, index <= doublings);
         level.side_px = select(0u, level.side_px, index <= doublings);
         levels[index] = level;
-        put_work(index, cells, 64u);
+        put_work(index, cells, SMALL_GROUP);
         // The finest level that may have sheets has the most cells.
         if index == SHEET_LEVELS[0] {
             put_work(WORK_SHEETS, cells, ITEMS_PER_GROUP);

@@ -27,10 +27,10 @@ struct Asked {
     point: atomic<u32>,
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn ask(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let level = levels[statistics.sheet_level];
-    let index = group_index(workgroup) * 64u + local;
+    let index = group_index(workgroup) * SMALL_GROUP + local;
     if index >= select(counters[ACTIVE], counters[RECOVERED], ROUND == 1u) || level.side_px == 0u {
         return;
     }

@@ -15,10 +15,10 @@
 @group(0) @binding(4) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(5) var<storage, read_write> clusters: array<vec4f>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn fill(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let level = levels[0];
-    let index = group_index(workgroup) * 64u + local;
+    let index = group_index(workgroup) * SMALL_GROUP + local;
     if index >= level.columns * level.rows {
         return;
     }

@@ -7,7 +7,7 @@ use super::sheets::{SHEET_LEVELS, SHEETS};
 use super::{self as adapt, SCALES, cells, depth, noise, quadric, rows, rules, sheets, through};
 use crate::Error;
 use crate::fit::{self, Surfel};
-use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, Step, constants, files, passes};
+use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
 use crate::project::gpu::{Counter, Round, ScreenBuffers, few};
 
 /// Imports and constants of the passes.
@@ -89,8 +89,6 @@ passes! {
     TURN_ROWS = "turn_rows",
 }
 
-/// Invocations in a workgroup.
-const GROUP: usize = 64;
 /// Invocations that sum up a ball together, on hardware and on a software device, which runs eight side by side.
 const TOGETHER: [u32; 2] = [32, 8];
 /// Clusters of a cell that are stored side by side.
@@ -334,7 +332,7 @@ impl AdaptPasses {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
             steps.extend([
                 self.pick.step(gpu, &[counters, surfels, picked], screen.groups(round.work_64())),
-                self.sample.step(gpu, &[surfels, picked, sampled], MOST_SAMPLED.div_ceil(GROUP) as u32),
+                self.sample.step(gpu, &[surfels, picked, sampled], (MOST_SAMPLED as u32).div_ceil(SMALL_GROUP)),
                 self.scatter.step(gpu, &balls, (SCALES * MOST_SAMPLED) as u32),
                 self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], (SAMPLE_PARTS * SCALES) as u32),
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, statistics], 1),

@@ -13,11 +13,11 @@
 // The level to fill.
 @group(0) @binding(3) var<uniform> which: u32;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn merge(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let level = levels[which];
     let below = levels[which - 1u];
-    let index = group_index(workgroup) * 64u + local;
+    let index = group_index(workgroup) * SMALL_GROUP + local;
     if index >= level.columns * level.rows {
         return;
     }

@@ -15,9 +15,9 @@ fn hash_index(number: u32) -> u32 {
     return second ^ (second >> 16u);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn pick(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let place = group_index(workgroup) * 64u + local;
+    let place = group_index(workgroup) * SMALL_GROUP + local;
     let len = counters[ACTIVE];
     let below = (0xffffffffu / max(len, NOISE_SAMPLE_COUNT)) * NOISE_SAMPLE_COUNT;
     // A dropped point has no ball.

@@ -27,7 +27,7 @@ fn steady_share(size: u32) -> f32 {
     return select(-1.0, f32(atomicLoad(&steady[size])) / f32(max(count, 1u)), count >= LEAST_PAIRS);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let part = workgroup.x / SCALES;
     let scale = workgroup.x % SCALES;
@@ -50,7 +50,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     workgroupBarrier();
     var own_fitted = vec2u(0u);
     var own_thin = vec2u(0u);
-    for (var index = local; index < len; index += 64u) {
+    for (var index = local; index < len; index += SMALL_GROUP) {
         let bits = vec2u(scatters[first + index], scatters[next + index]);
         own_fitted += select(vec2u(0u), vec2u(1u), bits != vec2u(TOO_FEW));
         own_thin += select(vec2u(0u), vec2u(1u), bits < vec2u(THICK));
@@ -58,7 +58,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     for (var size = 0u; size < STEADY_SCALES && scale < STEADY_SCALES; size++) {
         var own_pairs = 0u;
         var own_steady = 0u;
-        for (var index = local; index < kept; index += 64u) {
+        for (var index = local; index < kept; index += SMALL_GROUP) {
             let bits = vec2u(scatters[size * MOST_SAMPLED + index], scatters[(size + 1u) * MOST_SAMPLED + index]);
             if bits.x > 0u && bits.x < THICK && bits.y != TOO_FEW {
                 own_pairs += 1u;
@@ -96,7 +96,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     for (var bit = 31u; bit > 0u; bit--) {
         let tried = found | (1u << (bit - 1u));
         var own = 0u;
-        for (var index = local; index < len; index += 64u) {
+        for (var index = local; index < len; index += SMALL_GROUP) {
             let bits = scatters[first + index];
             let counts = bits != TOO_FEW && (bits < THICK || !is_thin);
             own += select(0u, 1u, counts && (bits & ~THICK) < tried);

@@ -24,11 +24,11 @@ fn one(index: u32, len: u32) -> vec2u {
     return vec2u(place, bitcast<u32>(surfels[place].k_radius));
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn sample(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let len = min(picked[MOST_SAMPLED], MOST_SAMPLED);
     let fours = (len + 3u) / 4u;
-    for (var four = local; four < fours; four += 64u) {
+    for (var four = local; four < fours; four += SMALL_GROUP) {
         let at = 4u * four;
         let a = one(at, len);
         let b = one(at + 1u, len);
@@ -38,7 +38,7 @@ fn sample(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         k_radii[four] = vec4u(a.y, b.y, c.y, d.y);
     }
     workgroupBarrier();
-    let own = one(workgroup.x * 64u + local, len);
+    let own = one(workgroup.x * SMALL_GROUP + local, len);
     if own.x != NONE {
         var before = vec4u(0u);
         for (var four = 0u; four < fours; four++) {

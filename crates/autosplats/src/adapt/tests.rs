@@ -135,7 +135,7 @@ impl Case {
             fit(&screen, queries, &neighborhoods, &view, &fit_rules, &mut surfels, &crate::cancel::NEVER);
             surfels
         });
-        Self { screen, view, fitted, known: DepthNoise::new(cloud) }
+        Self { screen, view, fitted, known: DepthNoise::new(cloud, &crate::cancel::NEVER) }
     }
 
     pub(crate) fn cells(&self) -> Cells {

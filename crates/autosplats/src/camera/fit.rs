@@ -3,15 +3,14 @@
 use autosplats_cloud::{Axes, Crs, PointCloud, Scan};
 use glam::{DQuat, DVec2, DVec3};
 
+use super::body::{OUTLIER_SHARE, main_body, robust_range, samples};
 use super::{Camera, Projection};
 use crate::Error;
 
 /// Points in the sample: enough for quantiles, few enough to cost nothing.
 const FIT_SAMPLES: usize = 100_000;
-/// Fraction of the points at each end of each axis that may be outliers.
-const OUTLIER_SHARE: f64 = 0.005;
-/// Trimmed ends are kept if they reach no further than this fraction of the rest's extent.
-const KEPT_EXTENT_SHARE: f64 = 0.2;
+/// Radii of the core of the points within which all points are shown; see [`main_body`].
+const BODY_REACH: f64 = 1.3;
 /// Fraction of the picture left free at each side.
 const FREE_PICTURE_SHARE: f64 = 0.04;
 
@@ -64,10 +63,10 @@ const EYE_HEIGHT_RATIO: f64 = 0.47;
 #[non_exhaustive]
 pub enum ViewDirection {
     /// Chosen from the data. Points in a camera's frame, in perspective, are seen from the camera. A scan that is far
-    /// denser near its sensor, as of a lidar on a car, is seen from behind and above the sensor. This needs perspective
-    /// and Z up. Several sensors count as one in their middle. An unknown sensor is assumed at the origin if the cloud
-    /// has no coordinate system. Points that sensors saw from one side are seen from half right of and above that side.
-    /// All else as [`Iso`](Self::Iso).
+    /// denser near its sensor, as of a lidar on a car, is seen from behind and above the sensor. This needs
+    /// perspective. Several sensors count as one in their middle. An unknown sensor is assumed at the origin if the
+    /// cloud has no coordinate system. Points that sensors saw from one side are seen from half right of and above that
+    /// side. All else as [`Iso`](Self::Iso).
     #[default]
     Auto,
     /// From the front, half right and above.
@@ -84,43 +83,6 @@ pub enum ViewDirection {
     Top,
     /// From below, with the front at the upper edge.
     Bottom,
-}
-
-/// Unit vectors right, front (towards the viewer) and up of a convention.
-fn frame(axes: Axes) -> [DVec3; 3] {
-    match axes {
-        Axes::ZUp => [DVec3::X, DVec3::NEG_Y, DVec3::Z],
-        Axes::YUp => [DVec3::X, DVec3::Z, DVec3::Y],
-        Axes::Camera => [DVec3::X, DVec3::NEG_Z, DVec3::NEG_Y],
-    }
-}
-
-/// Unit vector up in world coordinates.
-pub(crate) fn up(axes: Axes) -> DVec3 {
-    frame(axes)[2]
-}
-
-/// The axes that a cloud states, or else a guess. Clouds with an origin other than zero or a flat extent have Z up,
-/// others Y up.
-///
-/// # Examples
-///
-/// ```
-/// use autosplats::{cloud::{Axes, PointCloud, glam::DVec3}, guess_axes};
-///
-/// let floor = (0..100).map(|i| [(i % 10) as f32, (i / 10) as f32, 0.0]).collect();
-/// assert_eq!(guess_axes(&PointCloud::new(DVec3::ZERO, floor)), Axes::ZUp);
-/// ```
-pub fn guess_axes(cloud: &PointCloud) -> Axes {
-    cloud.axes().unwrap_or_else(|| {
-        let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
-        let [x, y, z] = [0, 1, 2].map(|axis| {
-            let [low, high] = robust_range(&samples, axis);
-            high - low
-        });
-        let flat = z < 0.35 * x.max(y) && z < x.min(y);
-        if flat || cloud.origin() != DVec3::ZERO { Axes::ZUp } else { Axes::YUp }
-    })
 }
 
 impl Camera {
@@ -156,7 +118,7 @@ impl Camera {
         aspect: f64,
         projection: Projection,
     ) -> Result<Self, Error> {
-        let [right, front, up] = frame(axes);
+        let [right, front, up] = axes.frame();
         let iso = front + 0.62 * right + 0.55 * up;
         let (to_viewer, picture_up) = match direction {
             ViewDirection::Auto if axes == Axes::Camera => (front, up),
@@ -173,8 +135,8 @@ impl Camera {
             Projection::PerspectiveFovDeg(fov) if direction == ViewDirection::Auto => Some((axes, fov)),
             _ => None,
         };
-        if let Some((Axes::ZUp, fov)) = own
-            && let Some([eye, look_at]) = behind_sensor(cloud, fov, aspect)
+        if let Some((axes, fov)) = own.filter(|&(axes, _)| axes != Axes::Camera)
+            && let Some([eye, look_at]) = behind_sensor(cloud, axes, fov, aspect)
         {
             let camera = Self { eye, look_at, up: picture_up, projection };
             return camera.axes().map(|_| camera);
@@ -199,10 +161,7 @@ impl Camera {
         let camera = &mut self;
         let axes = camera.axes()?;
         let forward = axes[2];
-        let samples = samples(cloud, axes);
-        let ranges = [0, 1, 2].map(|axis| robust_range(&samples, axis));
-        let kept: Vec<DVec3> =
-            samples.into_iter().filter(|p| (0..3).all(|i| (ranges[i][0]..=ranges[i][1]).contains(&p[i]))).collect();
+        let (kept, ranges) = main_body(samples(cloud, axes, FIT_SAMPLES), BODY_REACH);
         if kept.is_empty() {
             return Err(Error::NothingVisible("the cloud has no point with finite coordinates".into()));
         }
@@ -222,7 +181,7 @@ impl Camera {
         let distance = match &mut camera.projection {
             Projection::OrthographicHeight(height) => {
                 let [width, upright] = [0, 1].map(|i| (extent[i] + 2.0 * rim) / (2.0 * half_room));
-                *height = upright.max(width / aspect).max(1e-12);
+                *height = upright.max(width / aspect).max(f64::MIN_POSITIVE);
                 // In front of all points, including trimmed ones that are near.
                 2.0 * extent[2] + *height
             }
@@ -311,7 +270,7 @@ fn from_origin(
 /// if no sensor is known, or if the sensors saw all sides or stood among the points.
 fn direction_to_seen_side(cloud: &PointCloud, up: DVec3) -> Option<DVec3> {
     let sensor = middle_of(cloud.scans())? - cloud.origin();
-    let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
+    let samples = samples(cloud, DVec3::AXES, FIT_SAMPLES);
     let ways: Vec<DVec3> = samples.iter().map(|&p| (sensor - p).reject_from(up)).collect();
     let mean = ways.iter().map(|way| way.normalize_or_zero()).sum::<DVec3>() / ways.len().max(1) as f64;
     let mut ranges: Vec<f64> = ways.iter().map(|way| way.length()).collect();
@@ -327,16 +286,19 @@ fn middle_of(scans: &[Scan]) -> Option<DVec3> {
     (!scans.is_empty()).then(|| scans.iter().map(Scan::position).sum::<DVec3>() / scans.len() as f64)
 }
 
-/// Eye behind and above the sensor of a cloud with Z up, and its target ahead. Several sensors count as one in their
-/// middle; without scans and coordinate system the sensor is at the origin. `None` if the sensor does not stand among
-/// the points. `fov` is the vertical field of view in degrees.
-fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]> {
+/// Eye behind and above the sensor of a cloud, and its target ahead. Several sensors count as one in their middle;
+/// without scans and coordinate system the sensor is at the origin. `None` if the sensor does not stand among the
+/// points. `fov` is the vertical field of view in degrees.
+fn behind_sensor(cloud: &PointCloud, axes: Axes, fov: f64, aspect: f64) -> Option<[DVec3; 2]> {
     let sensor = match middle_of(cloud.scans()) {
         None if *cloud.crs() != Crs::default() => return None,
         sensor => sensor.unwrap_or_default(),
     };
-    let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
-    let points: Vec<DVec3> = samples.into_iter().map(|p| p + (cloud.origin() - sensor)).collect();
+    // As if Z were up: the first axis to the right, the second away from the viewer.
+    let [right, front, up] = axes.frame();
+    let frame = [right, -front, up];
+    let offset = DVec3::from(frame.map(|axis| axis.dot(cloud.origin() - sensor)));
+    let points: Vec<DVec3> = samples(cloud, frame, FIT_SAMPLES).into_iter().map(|p| p + offset).collect();
     let mut ranges: Vec<f64> = points.iter().map(|p| p.truncate().length()).collect();
     ranges.sort_unstable_by(f64::total_cmp);
     let range = |share: f64| ranges.get((share * ranges.len() as f64) as usize).copied();
@@ -380,34 +342,7 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
     };
     let places = if sees_one_side { &places[..2] } else { &places };
     let best = places.iter().min_by_key(|place| in_the_way(place))?;
-    Some(best.map(|place| sensor + place))
-}
-
-/// Finite positions relative to the cloud's origin along `axes`, from evenly spaced indices.
-fn samples(cloud: &PointCloud, axes: [DVec3; 3]) -> Vec<DVec3> {
-    let positions = cloud.positions();
-    let step = positions.len().div_ceil(FIT_SAMPLES).max(1);
-    let finite = positions.iter().step_by(step).map(|&p| DVec3::from(p.map(f64::from))).filter(|p| p.is_finite());
-    finite.map(|p| DVec3::from(axes.map(|axis| axis.dot(p)))).collect()
-}
-
-/// Range along `axis` without outliers; (0, 0) without points.
-fn robust_range(samples: &[DVec3], axis: usize) -> [f64; 2] {
-    let mut values: Vec<f64> = samples.iter().map(|p| p[axis]).collect();
-    values.sort_unstable_by(f64::total_cmp);
-    let (Some(&first), Some(&last)) = (values.first(), values.last()) else { return [0.0; 2] };
-    let trim = (values.len() as f64 * OUTLIER_SHARE) as usize;
-    let [low, high] = [values[trim], values[values.len() - 1 - trim]];
-    let margin = KEPT_EXTENT_SHARE * (high - low);
-    let nearest = |bound: f64| {
-        let inside = values.partition_point(|&v| v < bound);
-        values[inside.min(values.len() - 1)]
-    };
-    let furthest = |bound: f64| values[values.partition_point(|&v| v <= bound).max(1) - 1];
-    [
-        if first < low - margin { nearest(low - margin) } else { first },
-        if last > high + margin { furthest(high + margin) } else { last },
-    ]
+    Some(best.map(|p| sensor + frame[0] * p.x + frame[1] * p.y + frame[2] * p.z))
 }
 
 #[cfg(test)]

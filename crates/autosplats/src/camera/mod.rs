@@ -4,14 +4,17 @@
 //! away from the eye. Distances are in world units. Pixel (0, 0) is the top-left pixel and covers `0.0..1.0` in both
 //! directions; its centre is at (0.5, 0.5).
 
+mod body;
 mod fit;
 mod lens;
 mod reproject;
+mod upright;
 
-pub(crate) use fit::up;
-pub use fit::{ViewDirection, guess_axes};
+pub use fit::ViewDirection;
+
 pub use lens::Lens;
 pub(crate) use reproject::{PlacedView, Reprojection};
+pub use upright::guess_axes;
 
 use glam::{DVec3, Mat3, Vec3};
 use serde::{Deserialize, Serialize};

@@ -179,7 +179,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     );
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn fit(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         let active_points = atomicLoad(&counters[ACTIVE]);
@@ -191,7 +191,7 @@ fn fit(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index)
         atomicStore(&outliers, 0u);
     }
     workgroupBarrier();
-    let index = group_index(workgroup) * 64u + local;
+    let index = group_index(workgroup) * SMALL_GROUP + local;
     if index < task.len {
         let place = task.first + index;
         let fitted = surfel(queries[place], neighborhoods[place]);

@@ -6,6 +6,11 @@ use std::collections::HashSet;
 /// Workgroups in a row of a dispatch. More than 65535 need a second dimension, which `shared/groups.wgsl` undoes.
 pub(super) const GROUPS_PER_ROW: u32 = 32768;
 
+/// Invocations in a workgroup of passes with much work for each item.
+pub(crate) const SMALL_GROUP: u32 = 64;
+/// Invocations in a workgroup of most other passes.
+pub(crate) const LARGE_GROUP: u32 = 256;
+
 /// Name and text of a WGSL file that others import.
 pub(crate) type File = (&'static str, &'static str);
 
@@ -90,7 +95,14 @@ const SHARED: Library = Library {
         "density", "divide", "eigen", "frame", "groups", "half", "layers", "matters", "moved", "neighborhood",
         "noise", "orthonormal", "picture", "project_point", "put_work", "range_keys", "rank", "reproject", "round", "screen", "surfel",
     )],
-    constants: &[constants![GROUPS_PER_ROW, MAX_F32 = f32::MAX, MIN_POSITIVE = f32::MIN_POSITIVE, NO_POINT = u32::MAX]],
+    constants: &[constants![
+        GROUPS_PER_ROW,
+        LARGE_GROUP,
+        MAX_F32 = f32::MAX,
+        MIN_POSITIVE = f32::MIN_POSITIVE,
+        NO_POINT = u32::MAX,
+        SMALL_GROUP
+    ]],
 };
 
 /// A value that constants of WGSL may have.

@@ -24,7 +24,7 @@ pub(crate) use device::test_gpu;
 pub use device::{AdapterSummary, adapters};
 pub(crate) use device::{Gpu, INT64_ATOMICS};
 pub(crate) use frame::FrameUniform;
-pub(crate) use link::{Constant, File, InWgsl, Library, constants, files, indices, link};
+pub(crate) use link::{Constant, File, InWgsl, LARGE_GROUP, Library, SMALL_GROUP, constants, files, indices, link};
 pub(crate) use raster::{DepthMask, Draw, Load, RasterPass, Target, Targets};
 pub use recorder::PassTime;
 pub(crate) use recorder::{Clock, DISPATCH_BYTES, Recorder, stage_ms};

@@ -110,14 +110,14 @@ pub enum Orientation {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// World coordinates; finite, within 1e18 of the cloud's origin.
+    /// World coordinates; finite, within 1e18 of the cloud's origin, if the cloud is of ordinary size.
     pub position: DVec3,
     /// Indices of the points. Ranges of different viewpoints must not overlap.
     pub points: Range<usize>,
 }
 
-/// One value per point, in the cloud's order. All are NaN for points with a coordinate that is not finite or beyond
-/// ±1e18.
+/// One value per point, in the cloud's order. All are NaN for points with a coordinate that is not finite, or beyond
+/// ±1e18 in a cloud of ordinary size.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Normals {
     /// Unit normals. For neighbours on a line, the perpendicular nearest to the wanted side; at one place, that
@@ -172,15 +172,31 @@ pub fn estimate_normals(
 /// where [`Normals`] are NaN. Any k is allowed.
 ///
 /// # Errors
-/// [`Error::TooManyPoints`].
-pub(crate) fn exact_k_radii(cloud: &PointCloud, k: u32) -> Result<Vec<f32>, Error> {
-    let finite = finite_points(cloud).len() as u32;
-    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, &())?;
+/// [`Error::TooManyPoints`], and [`Error::Cancelled`] if `progress` says so.
+pub(crate) fn exact_k_radii(cloud: &PointCloud, k: u32, progress: &dyn Progress) -> Result<Vec<f32>, Error> {
+    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, progress)?;
+    // The radius of points that are not finite is not either.
+    let finite = radius.iter().filter(|radius| radius.is_finite()).count() as u32;
     let of_density = 0.5 * (k.min(finite.saturating_sub(1)).max(1) as f32).sqrt();
     Ok(radius.into_iter().map(|radius| radius * of_density).collect())
 }
 
+/// Estimates at a scale at which powers of lengths are exact enough.
 fn estimate(cloud: &PointCloud, settings: &NormalSettings, progress: &dyn Progress) -> Result<Normals, Error> {
+    let factor = cloud.computing_scale();
+    if factor == 1.0 {
+        return estimate_at_scale(cloud, settings, progress);
+    }
+    let mut settings = settings.clone();
+    if let Orientation::Viewpoints(viewpoints) = &mut settings.orientation {
+        viewpoints.iter_mut().for_each(|viewpoint| viewpoint.position *= factor);
+    }
+    let mut normals = estimate_at_scale(&cloud.scaled(factor), &settings, progress)?;
+    normals.radius.iter_mut().for_each(|radius| *radius = (f64::from(*radius) / factor) as f32);
+    Ok(normals)
+}
+
+fn estimate_at_scale(cloud: &PointCloud, settings: &NormalSettings, progress: &dyn Progress) -> Result<Normals, Error> {
     if u32::try_from(cloud.len()).is_err() {
         return Err(Error::TooManyPoints(cloud.len()));
     }

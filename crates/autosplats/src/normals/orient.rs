@@ -53,7 +53,7 @@ fn is_terrain(cloud: &PointCloud) -> bool {
         (std::array::from_fn(|axis| min[axis].min(point[axis])), std::array::from_fn(|axis| max[axis].max(point[axis])))
     });
     let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| max[axis] - min[axis]);
-    cloud.axes() != Some(Axes::YUp) && z < TERRAIN_HEIGHT * x.min(y)
+    matches!(cloud.axes(), None | Some(Axes::ZUp | Axes::Camera)) && z < TERRAIN_HEIGHT * x.min(y)
 }
 
 /// Resolved orientation of normals.

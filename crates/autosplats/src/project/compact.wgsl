@@ -15,13 +15,13 @@
 @group(0) @binding(5) var<storage, read_write> pixels: array<u32>;
 @group(0) @binding(6) var<storage, read_write> cell_start: array<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     rank_clear(local);
     let block = group_index(workgroup);
     let strip_px = counters[STRIP_PX];
-    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
-        let flag = step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
+        let flag = step * LARGE_GROUP + local;
         let at = block * RANK_BLOCK_FLAGS + flag;
         if at < arrayLength(&keys) {
             if keys[cell_slot(at, strip_px).slot].point != NO_POINT {
@@ -31,8 +31,8 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     }
     rank_finish(local);
     let before = block_sums[block];
-    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
-        let flag = step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
+        let flag = step * LARGE_GROUP + local;
         let at = block * RANK_BLOCK_FLAGS + flag;
         if at < arrayLength(&keys) {
             let place = cell_slot(at, strip_px);

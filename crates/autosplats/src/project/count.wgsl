@@ -22,7 +22,7 @@ struct CountedCell {
 
 var<workgroup> owned: atomic<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         atomicStore(&owned, 0u);
@@ -33,8 +33,8 @@ fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let cell_px = counters[CELL_PX];
     let cell_columns = counters[CELL_COLUMNS];
     var own = 0u;
-    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
-        let at = block * RANK_BLOCK_FLAGS + step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
+        let at = block * RANK_BLOCK_FLAGS + step * LARGE_GROUP + local;
         if at < arrayLength(&keys) {
             let place = cell_slot(at, strip_px);
             let key = keys[place.slot];

@@ -1,6 +1,6 @@
 //! A cloud on the device, in chunks where one binding cannot hold it, uploaded piece by piece.
 
-use autosplats_cloud::{FieldValues, PointCloud};
+use autosplats_cloud::{PointCloud, RelativeValues};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
@@ -19,7 +19,7 @@ const SHRINK_RATIO: usize = 4;
 pub(crate) struct PointValues<'a> {
     /// sRGB.
     pub(crate) colors: Option<&'a [[u8; 3]]>,
-    pub(crate) scalar: Option<&'a FieldValues>,
+    pub(crate) scalar: Option<RelativeValues<'a>>,
 }
 
 impl PointValues<'_> {
@@ -38,7 +38,7 @@ impl PointValues<'_> {
                 put(u32::from_le_bytes([r, g, b, 0]));
             }
             if let Some(scalar) = self.scalar {
-                put((scalar.get(first + at) as f32).to_bits());
+                put(scalar.get(first + at).to_bits());
             }
         });
     }

@@ -16,9 +16,9 @@
 @group(0) @binding(7) var<storage, read_write> points: array<ScreenPoint>;
 @group(0) @binding(8) var<storage, read_write> values: array<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn gather(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= counters[VISIBLE] {
         return;
     }

@@ -87,7 +87,7 @@ pub(crate) fn few(gpu: &Gpu) -> u32 {
 }
 
 /// Invocations in a workgroup of most passes.
-const GROUP: u32 = 256;
+const GROUP: u32 = crate::gpu::LARGE_GROUP;
 /// Flags that one workgroup ranks: a block.
 pub(crate) const RANK_BLOCK_FLAGS: u32 = 2048;
 

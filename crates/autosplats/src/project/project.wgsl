@@ -14,10 +14,10 @@
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> sixteenths: array<atomic<u32>>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     count_dropped_clear(local);
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index < chunk.len {
         let at = 3u * index;
         let projected = project_point(vec3f(positions[at], positions[at + 1u], positions[at + 2u]));

@@ -24,10 +24,10 @@ struct AtomicKey {
     depth: atomic<u32>,
 }
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     count_dropped_clear(local);
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index < chunk.len {
         let at = 3u * index;
         let projected = project_point(vec3f(positions[at], positions[at + 1u], positions[at + 2u]));

@@ -12,12 +12,12 @@ override TOTAL: u32;
 // Index of the counter of items in blocks that have sums. Equal to TOTAL if all blocks have sums.
 override SCANNED: u32;
 
-var<workgroup> before: array<u32, 257>;
+var<workgroup> before: array<u32, LARGE_GROUP + 1u>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn scan(@builtin(local_invocation_index) local: u32) {
     let blocks = select((counters[SCANNED] + RANK_BLOCK_FLAGS - 1u) / RANK_BLOCK_FLAGS, arrayLength(&block_sums), SCANNED == TOTAL);
-    let each = (blocks + 255u) / 256u;
+    let each = (blocks + LARGE_GROUP - 1u) / LARGE_GROUP;
     let first = min(local * each, blocks);
     let end = min(first + each, blocks);
     var sum = 0u;
@@ -28,7 +28,7 @@ fn scan(@builtin(local_invocation_index) local: u32) {
     workgroupBarrier();
     if local == 0u {
         before[0] = 0u;
-        for (var run = 1u; run <= 256u; run++) {
+        for (var run = 1u; run <= LARGE_GROUP; run++) {
             before[run] += before[run - 1u];
         }
         counters[TOTAL] = before[256];

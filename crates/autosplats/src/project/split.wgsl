@@ -16,7 +16,7 @@
 @group(0) @binding(5) var<storage, read_write> queries: array<u32>;
 @group(0) @binding(6) var<storage, read_write> passive: array<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     rank_clear(local);
     let block = group_index(workgroup);
@@ -24,8 +24,8 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let cell_px = counters[CELL_PX];
     let cell_columns = counters[CELL_COLUMNS];
     var active_steps = 0u;
-    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
-        let flag = step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
+        let flag = step * LARGE_GROUP + local;
         let index = block * RANK_BLOCK_FLAGS + flag;
         if index < visible {
             let point = points[index];
@@ -38,8 +38,8 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     rank_finish(local);
     let active_before = block_sums[block];
-    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
-        let flag = step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
+        let flag = step * LARGE_GROUP + local;
         let index = block * RANK_BLOCK_FLAGS + flag;
         let before = active_before + rank_of(flag);
         if index < visible {

@@ -15,7 +15,7 @@
 
 var<workgroup> active_points: atomic<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn split_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         atomicStore(&active_points, 0u);
@@ -26,8 +26,8 @@ fn split_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     let cell_px = counters[CELL_PX];
     let cell_columns = counters[CELL_COLUMNS];
     var own = 0u;
-    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
-        let index = block * RANK_BLOCK_FLAGS + step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
+        let index = block * RANK_BLOCK_FLAGS + step * LARGE_GROUP + local;
         if index < visible {
             let point = points[index];
             let cell = density[density_cell(pixel_xy(point.pixel), cell_px, cell_columns)];

@@ -13,17 +13,17 @@ override ITEMS_PER_GROUP: u32;
 
 @compute @workgroup_size(1)
 fn work() {
-    put_work(VISIBLE256, counters[VISIBLE], 256u);
+    put_work(VISIBLE256, counters[VISIBLE], LARGE_GROUP);
     put_work(VISIBLE_BLOCKS, counters[VISIBLE], RANK_BLOCK_FLAGS);
     put_work(PASSIVE_BLOCKS, counters[PASSIVE], RANK_BLOCK_FLAGS);
-    put_work(ACTIVE64, counters[ACTIVE], 64u);
-    put_work(ACTIVE256, counters[ACTIVE], 256u);
-    put_work(RECOVERED64, counters[RECOVERED], 64u);
-    put_work(RECOVERED256, counters[RECOVERED], 256u);
+    put_work(ACTIVE64, counters[ACTIVE], SMALL_GROUP);
+    put_work(ACTIVE256, counters[ACTIVE], LARGE_GROUP);
+    put_work(RECOVERED64, counters[RECOVERED], SMALL_GROUP);
+    put_work(RECOVERED256, counters[RECOVERED], LARGE_GROUP);
     put_work(LARGE_SPLATS, counters[LARGE], 1u);
-    put_work(LEFT_ACTIVE64, counters[LEFT_ACTIVE], 64u);
-    put_work(LEFT_RECOVERED64, counters[LEFT_RECOVERED], 64u);
+    put_work(LEFT_ACTIVE64, counters[LEFT_ACTIVE], SMALL_GROUP);
+    put_work(LEFT_RECOVERED64, counters[LEFT_RECOVERED], SMALL_GROUP);
     put_work(ACTIVE_FEW, counters[ACTIVE], ITEMS_PER_GROUP);
     put_work(RECOVERED_FEW, counters[RECOVERED], ITEMS_PER_GROUP);
-    put_work(QUERIES256, counters[ACTIVE] + counters[RECOVERED], 256u);
+    put_work(QUERIES256, counters[ACTIVE] + counters[RECOVERED], LARGE_GROUP);
 }

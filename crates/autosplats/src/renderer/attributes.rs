@@ -1,6 +1,6 @@
 //! Attributes that splats carry for a picture.
 
-use autosplats_cloud::{Field, FieldValues, PointCloud};
+use autosplats_cloud::{Field, PointCloud, RelativeValues};
 
 use super::Settings;
 use crate::Error;
@@ -68,8 +68,8 @@ impl SplatAttributes {
     }
 
     /// Values of the scalar field.
-    pub(super) fn scalar<'a>(&self, cloud: &'a PointCloud) -> Option<&'a FieldValues> {
-        cloud.field(self.scalar.as_ref()?).map(|field| &field.values)
+    pub(super) fn scalar<'a>(&self, cloud: &'a PointCloud) -> Option<RelativeValues<'a>> {
+        cloud.field(self.scalar.as_ref()?).map(|field| RelativeValues::new(&field.values))
     }
 }
 

@@ -70,10 +70,11 @@ impl CpuRenderer {
         self.view.as_ref().map_or_else(Vec::new, |view| point_surfels(&self.surfels, view))
     }
 
-    /// See [`Renderer::render_while`](super::Renderer::render_while). The planes in `given` replace search and fit.
+    /// See [`Renderer::render_while`](super::Renderer::render_while). The planes in `given` replace search and fit. The
+    /// cloud comes with the length of its unit in world units.
     pub(super) fn render(
         &mut self,
-        cloud: &PointCloud,
+        (cloud, unit): (&PointCloud, f64),
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
@@ -85,7 +86,7 @@ impl CpuRenderer {
             Some(_) => Mode::Given,
             None => {
                 check_engine(settings.reconstruction.engine)?;
-                Mode::of(&settings.reconstruction, cloud, size)
+                Mode::of(&settings.reconstruction, cloud, &picture)
             }
         };
         let rules = Rules::new(&settings.reconstruction, mode, size, |_, _| true);
@@ -106,6 +107,7 @@ impl CpuRenderer {
             given,
             attributes,
             cancel: &cancel,
+            unit,
             picture,
             view: picture.with_margin(rules.margin_px),
             search_counts: SearchCounts::default(),
@@ -138,6 +140,8 @@ struct CpuFrame<'a> {
     given: Option<GivenPlanes<'a>>,
     attributes: Attributes<'a>,
     cancel: &'a Cancel<'a>,
+    /// World units per unit of the cloud.
+    unit: f64,
     /// View of the picture, without the margin.
     picture: View,
     /// View of the screen.
@@ -203,7 +207,10 @@ impl CpuFrame<'_> {
 
     fn fill_cells(&mut self) {
         let CpuRenderer { projector, adapter, depth_noise, .. } = &mut *self.renderer;
-        depth_noise.get_or_insert_with(|| DepthNoise::new(self.cloud));
+        if depth_noise.is_none() {
+            let found = DepthNoise::new(self.cloud, self.cancel);
+            *depth_noise = (!self.cancel.is_given_up()).then_some(found);
+        }
         adapter.begin(projector.screen(), &self.view, self.rules.project.k, self.cancel);
     }
 
@@ -240,13 +247,13 @@ impl CpuFrame<'_> {
     fn orient(&mut self, round: Round) {
         let CpuRenderer { projector, sensors, surfels, .. } = &mut *self.renderer;
         let sensors = sensors.get_or_insert_with(|| Sensors::new(self.cloud));
-        sensors.orient(&mut surfels[first(projector.screen(), round)..], &self.view);
+        sensors.orient(&mut surfels[first(projector.screen(), round)..], &self.view, self.cancel);
     }
 
     fn average(&mut self, round: Round) {
         let CpuRenderer { projector, over_time, splatter, surfels, .. } = &mut *self.renderer;
         let screen = projector.screen();
-        over_time.smooth(&mut surfels[first(screen, round)..], screen, splatter.last(), &self.view);
+        over_time.smooth(&mut surfels[first(screen, round)..], screen, splatter.last(), &self.view, self.cancel);
     }
 
     fn draw(&mut self, round: Round) {
@@ -271,7 +278,7 @@ impl CpuFrame<'_> {
     fn keep(&mut self) {
         let CpuRenderer { projector, over_time, surfels, .. } = &mut *self.renderer;
         if self.rules.averaged.is_some() {
-            over_time.keep(surfels, projector.screen(), &self.view);
+            over_time.keep(surfels, projector.screen(), &self.view, self.cancel);
         }
     }
 
@@ -296,12 +303,22 @@ impl CpuFrame<'_> {
         let CpuRenderer { upward, exposure, splatter, image, last_picture, .. } = &mut *self.renderer;
         let Self { cloud, settings: Settings { shading, all_layers, .. }, .. } = self;
         let exposure = exposure.of(cloud, shading);
-        let scene = Scene { view: &self.picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let layers = splatter.last();
+        let values = layers.scalar_about;
+        let scene = Scene {
+            view: &self.picture,
+            up: upward.of(cloud),
+            origin: cloud.origin(),
+            unit: self.unit,
+            exposure,
+            values,
+        };
         let mut following = self.rules.averaged.map(|_| last_picture.following(self.picture));
-        let mut average = following.as_mut().map(|following| |image: &mut Image| following.average(layers, image));
+        let cancel = self.cancel;
+        let mut average =
+            following.as_mut().map(|following| |image: &mut Image| following.average(layers, image, cancel));
         let average = average.as_mut().map(|average| average as &mut dyn FnMut(&mut Image));
-        self.value_range = shade(layers, &scene, shading, *all_layers, average, image, self.cancel);
+        self.value_range = shade(layers, &scene, shading, *all_layers, average, image, cancel);
     }
 
     /// Makes the frame the last one.

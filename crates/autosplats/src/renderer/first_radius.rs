@@ -5,6 +5,7 @@ use autosplats_cloud::PointCloud;
 use super::{PointSurfel, Renderer, Settings};
 use crate::Error;
 use crate::camera::Camera;
+use crate::cancel::Cancel;
 use crate::normals::exact_k_radii;
 use crate::search::SearchEngine;
 
@@ -33,7 +34,8 @@ pub struct RadiusTrial {
 /// ignored. Grid culling is off, so that all visible points are searched.
 ///
 /// # Errors
-/// Those of [`Renderer::render`]; [`Error::NothingVisible`] if no visible point has neighbours.
+/// Those of [`Renderer::render_while`], which is given `go_on`; [`Error::NothingVisible`] if no visible point has
+/// neighbours.
 ///
 /// # Examples
 ///
@@ -46,7 +48,7 @@ pub struct RadiusTrial {
 ///
 /// let mut renderer = Renderer::with_backend(Backend::Gpu)?;
 /// let (size, settings) = ([1920, 1080], Settings::default());
-/// let best = best_first_radius(&mut renderer, &cloud, &camera, size, &settings, 0.99)?;
+/// let best = best_first_radius(&mut renderer, &cloud, &camera, size, &settings, 0.99, &|| true)?;
 /// println!("{} takes {} ms", best.first_radius, best.search_ms);
 /// # Ok::<(), autosplats::Error>(())
 /// ```
@@ -57,6 +59,7 @@ pub fn best_first_radius(
     size: [u32; 2],
     settings: &Settings,
     accuracy: f64,
+    go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<RadiusTrial, Error> {
     let mut settings = settings.clone();
     settings.reconstruction.grid_culling = false;
@@ -65,14 +68,14 @@ pub fn best_first_radius(
         settings.reconstruction.engine = SearchEngine::KdTree { first_radius };
         let mut search_ms = f64::INFINITY;
         for _ in 0..frames {
-            let timings = renderer.render(cloud, camera, size, &settings)?.timings;
+            let timings = renderer.render_while(cloud, camera, size, &settings, go_on)?.timings;
             search_ms = search_ms.min(if timings.search > 0.0 { timings.search } else { timings.frame });
         }
         Ok::<_, Error>((search_ms, renderer.surfels()?))
     };
     // The visible points do not depend on the radius. This run also fails early if the renderer cannot render.
     let (_, visible) = run(f32::MIN_POSITIVE, 1)?;
-    let exact = exact_k_radii(cloud, k)?;
+    let exact = exact_k_radii(cloud, k, &Cancel::new(go_on))?;
     let radius_of = |surfel: &PointSurfel| exact[surfel.point as usize];
     let mut radii: Vec<f32> = visible.iter().map(radius_of).filter(|radius| *radius > 0.0).collect();
     radii.sort_unstable_by(f32::total_cmp);

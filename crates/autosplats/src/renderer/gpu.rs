@@ -19,6 +19,7 @@ use crate::Error;
 use crate::adapt::DepthNoise;
 use crate::adapt::gpu::DepthNoiseBuffer;
 use crate::camera::{Camera, PlacedView, View};
+use crate::cancel::NEVER;
 use crate::fit::Surfel;
 use crate::fit::orient::Sensors;
 use crate::fit::orient::gpu::{sensor_buffer, write_sensors};
@@ -148,7 +149,7 @@ impl GpuRenderer {
             self.cloud.resize(&self.gpu, cloud.len())?;
             self.uploader.positions(&self.gpu, cloud, &self.cloud, &|done| report(part * done))?;
             self.upload_sensors(&Sensors::new(cloud))?;
-            if self.depth_noise.write(&self.gpu, &DepthNoise::new(cloud))? {
+            if self.depth_noise.write(&self.gpu, &DepthNoise::new(cloud, &NEVER))? {
                 self.prepared = None;
             }
             self.resident.points = points;
@@ -212,11 +213,12 @@ impl GpuRenderer {
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
+        unit: f64,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
         // `checked` turns every failure of the device into an error.
-        self.gpu.clone().checked(move || self.frame(cloud, &view, size, settings, go_on))?
+        self.gpu.clone().checked(move || self.frame(cloud, &view, size, settings, unit, go_on))?
     }
 
     /// Renders after the checks.
@@ -226,20 +228,22 @@ impl GpuRenderer {
         view: &View,
         size: [u32; 2],
         settings: &Settings,
+        unit: f64,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let wanted = SplatAttributes::new(cloud, settings)?;
         let started = Instant::now();
         self.make_resident(cloud, &wanted, &|_| go_on())?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
-        let rules = self.prepare(cloud, size, &wanted, settings)?;
+        let rules = self.prepare(cloud, view, &wanted, settings)?;
         let screen = &view.with_margin(rules.margin_px);
         let Self {
             gpu, clock, prepared, upward, exposure, view: last_view, readback, image, layers, times, frame, ..
         } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let exposure = exposure.of(cloud, &settings.shading);
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
+        let values = wanted.scalar(cloud).map(|values| values.about()).unwrap_or_default();
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (PlacedView { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
         prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform);
@@ -267,6 +271,7 @@ impl GpuRenderer {
                 [_, _, _, surface, cover, extras] => prepared.layers.to_host(screen.margin, surface, cover, extras),
                 _ => GBuffer::default(),
             };
+            layers.scalar_about = values;
             (counters, value_range)
         })?;
         let waited_ms = waited.elapsed().as_secs_f64() * 1e3;
@@ -296,11 +301,12 @@ impl GpuRenderer {
         camera: &Camera,
         texture: &wgpu::Texture,
         settings: &Settings,
+        unit: f64,
     ) -> Result<(), Error> {
         let size = [texture.width(), texture.height()];
         check_texture(texture, size)?;
         let view = check(cloud, camera, size, settings)?;
-        self.gpu.clone().checked(|| self.frame_in_texture(cloud, &view, texture, settings))?
+        self.gpu.clone().checked(|| self.frame_in_texture(cloud, &view, texture, settings, unit))?
     }
 
     /// Renders into a texture after the checks.
@@ -310,16 +316,17 @@ impl GpuRenderer {
         view: &View,
         texture: &wgpu::Texture,
         settings: &Settings,
+        unit: f64,
     ) -> Result<(), Error> {
-        let size = [texture.width(), texture.height()];
         let wanted = SplatAttributes::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
-        let rules = self.prepare(cloud, size, &wanted, settings)?;
+        let rules = self.prepare(cloud, view, &wanted, settings)?;
         let screen = view.with_margin(rules.margin_px);
         let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let exposure = exposure.of(cloud, &settings.shading);
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
+        let values = wanted.scalar(cloud).map(|values| values.about()).unwrap_or_default();
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (PlacedView { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
         prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform.into_format(texture.format()));
@@ -336,17 +343,18 @@ impl GpuRenderer {
     fn prepare(
         &mut self,
         cloud: &PointCloud,
-        size: [u32; 2],
+        view: &View,
         wanted: &SplatAttributes,
         settings: &Settings,
     ) -> Result<Rules, Error> {
+        let size = view.picture_size();
         // A surfel is the largest record per screen point.
         let has_room = |margin: u32, halves| {
             let screen = size.map(|side| side + 2 * margin);
             ScreenBuffers::has_room::<Surfel>(&self.gpu, screen, halves, self.cloud.capacity())
                 && LayerBuffers::has_room(&self.gpu, screen, wanted.channels())
         };
-        let mode = Mode::of(&settings.reconstruction, cloud, size);
+        let mode = Mode::of(&settings.reconstruction, cloud, view);
         let rules = Rules::new(&settings.reconstruction, mode, size, has_room);
         let sensors = self.sensors.as_ref().map(|(_, len)| *len);
         let shape = Shape::new(size, &rules, sensors, wanted, settings);

@@ -70,7 +70,14 @@ pub fn shade_layers(layers: &GBuffer, camera: &Camera, shading: &Shading) -> Res
     }
     // The cloud of these colours is unknown.
     let exposure = shading.exposure.unwrap_or(1.0);
-    let scene = Scene { view: &view, up: camera.up.normalize(), origin: DVec3::ZERO, exposure };
+    let scene = Scene {
+        view: &view,
+        up: camera.up.normalize(),
+        origin: DVec3::ZERO,
+        unit: 1.0,
+        exposure,
+        values: layers.scalar_about,
+    };
     let mut image = Image::default();
     shade(layers, &scene, shading, true, None, &mut image, &NEVER);
     Ok(image)

@@ -8,6 +8,7 @@ mod frame;
 mod gpu;
 mod layers;
 mod rules;
+mod scaling;
 mod settings;
 mod settle;
 mod still;
@@ -18,6 +19,7 @@ use autosplats_cloud::PointCloud;
 
 use self::cpu::{CpuRenderer, check_engine};
 use self::gpu::GpuRenderer;
+use self::scaling::Scaling;
 use crate::camera::{Camera, View};
 use crate::fit::GivenPlanes;
 use crate::gpu::{AdapterSummary, Gpu, PassTime};
@@ -110,7 +112,8 @@ pub enum Backend {
     Gpu,
 }
 
-/// Renders clouds into pictures. A renderer keeps its buffers, so that frames after the first allocate very little.
+/// Renders clouds into pictures. A renderer keeps its buffers, so that frames after the first allocate very little; of
+/// a cloud much larger than 1e7 units or smaller than 1e-7 it keeps a copy.
 ///
 /// # Examples
 ///
@@ -132,6 +135,7 @@ pub enum Backend {
 #[derive(Debug)]
 pub struct Renderer {
     form: BackendRenderer,
+    scaling: Scaling,
 }
 
 #[derive(Debug)]
@@ -165,7 +169,7 @@ impl Default for Renderer {
 impl Renderer {
     /// Creates a renderer that runs on the CPU, in the current rayon thread pool.
     pub fn new() -> Self {
-        Self { form: BackendRenderer::Cpu(Box::default()) }
+        Self::from(BackendRenderer::Cpu(Box::default()))
     }
 
     /// Creates a renderer that runs on `backend`, on a device of its own.
@@ -174,7 +178,7 @@ impl Renderer {
     /// [`Error::Device`] if [`Backend::Gpu`] is requested and there is no GPU or it does not start;
     /// [`Error::DeviceMemory`].
     pub fn with_backend(backend: Backend) -> Result<Self, Error> {
-        let on = |gpu: Gpu| Ok(Self { form: BackendRenderer::Gpu(Box::new(GpuRenderer::new(gpu)?)) });
+        let on = |gpu: Gpu| Ok(Self::from(BackendRenderer::Gpu(Box::new(GpuRenderer::new(gpu)?))));
         match backend {
             Backend::Cpu => Ok(Self::new()),
             Backend::Gpu => Gpu::new().and_then(on),
@@ -210,7 +214,7 @@ impl Renderer {
     /// # }
     /// ```
     pub fn with_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
-        Ok(Self { form: BackendRenderer::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?)) })
+        Ok(Self::from(BackendRenderer::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?))))
     }
 
     /// Creates another renderer in the same place: on the CPU, or on the same device. On a device the two share the
@@ -233,7 +237,7 @@ impl Renderer {
         match &self.form {
             BackendRenderer::Cpu(_) => Ok(Self::new()),
             BackendRenderer::Gpu(renderer) => {
-                Ok(Self { form: BackendRenderer::Gpu(Box::new(GpuRenderer::new(renderer.device().clone())?)) })
+                Ok(Self::from(BackendRenderer::Gpu(Box::new(GpuRenderer::new(renderer.device().clone())?))))
             }
         }
     }
@@ -315,10 +319,7 @@ impl Renderer {
         if !go_on() {
             return Err(Error::Cancelled);
         }
-        match &mut self.form {
-            BackendRenderer::Cpu(renderer) => renderer.render(cloud, camera, size, settings, None, go_on),
-            BackendRenderer::Gpu(renderer) => renderer.render(cloud, camera, size, settings, go_on),
-        }
+        self.render_form(cloud, None, camera, size, settings, go_on)
     }
 
     /// Renders `cloud` with precomputed normals and radii, as [`estimate_normals`] returns them for the same `k`. CPU
@@ -365,13 +366,7 @@ impl Renderer {
         if let Some((what, given)) = lengths.into_iter().find(|&(_, given)| given != points) {
             return Err(Error::Normals { what, given, points });
         }
-        match &mut self.form {
-            BackendRenderer::Cpu(renderer) => {
-                let planes = GivenPlanes { normals, curvature, radius };
-                renderer.render(cloud, camera, size, settings, Some(planes), &|| true)
-            }
-            BackendRenderer::Gpu(_) => Err(Error::Device("precomputed normals are rendered on the CPU only".into())),
-        }
+        self.render_form(cloud, Some(GivenPlanes { normals, curvature, radius }), camera, size, settings, &|| true)
     }
 
     /// Surfels of the last frame: the fits of all reconstructed points whose surfel's centre is in the picture, in no
@@ -405,6 +400,7 @@ impl Renderer {
             BackendRenderer::Cpu(renderer) => Ok(renderer.surfels()),
             BackendRenderer::Gpu(renderer) => renderer.surfels(),
         }
+        .map(|surfels| self.scaling.surfels(surfels))
     }
 
     /// Convergence of the last frame's k-radius search: the number of searched points, then the number of unfinished
@@ -435,7 +431,10 @@ impl Renderer {
     ) -> Result<(), Error> {
         match &mut self.form {
             BackendRenderer::Cpu(_) => Ok(()),
-            BackendRenderer::Gpu(renderer) => renderer.upload(cloud, settings, report),
+            BackendRenderer::Gpu(renderer) => {
+                self.scaling.choose(cloud, None);
+                renderer.upload(self.scaling.cloud(cloud), settings, report)
+            }
         }
     }
 
@@ -471,7 +470,12 @@ impl Renderer {
     ) -> Result<(), Error> {
         match &mut self.form {
             BackendRenderer::Cpu(_) => Err(Error::Device("a texture can only be rendered into on a GPU".into())),
-            BackendRenderer::Gpu(renderer) => renderer.render_to_texture(cloud, camera, texture, settings),
+            BackendRenderer::Gpu(renderer) => {
+                let scaling = &mut self.scaling;
+                scaling.choose(cloud, Some(camera));
+                let (camera, settings) = (scaling.camera(camera), scaling.settings(settings));
+                renderer.render_to_texture(scaling.cloud(cloud), &camera, texture, &settings, scaling.unit())
+            }
         }
     }
 }

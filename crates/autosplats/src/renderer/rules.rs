@@ -17,6 +17,7 @@ use autosplats_cloud::PointCloud;
 
 use super::Reconstruction;
 use crate::adapt::AdaptRules;
+use crate::camera::View;
 use crate::fit::{FitRules, LONGEST, MIN_SURFACE_POINTS};
 use crate::project::ProjectRules;
 use crate::search::{SearchEngine, SearchRules};
@@ -27,6 +28,11 @@ const PICTURE_SIDE_PER_MARGIN: u32 = 12;
 /// Splat radius of the points of a very small cloud, as a fraction of the picture's shorter side. The drawn dots are
 /// 1.4 times as wide.
 const DOT_RADIUS_PER_PICTURE_SIDE: f32 = 0.0045;
+
+/// Points sampled to find out how many pixels the cloud's points hit.
+const HIT_SAMPLES: usize = 1 << 12;
+/// Points are crowded in few pixels if at least this many hit each, on average.
+const MIN_CROWD: usize = 16;
 
 /// How a frame makes a surface of its points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,17 +50,44 @@ pub(super) enum Mode {
 }
 
 impl Mode {
-    /// Mode of a cloud without given planes, in a picture of `size` pixels.
-    pub(super) fn of(settings: &Reconstruction, cloud: &PointCloud, size: [u32; 2]) -> Self {
+    /// Mode of a cloud without given planes in a picture.
+    pub(super) fn of(settings: &Reconstruction, cloud: &PointCloud, picture: &View) -> Self {
         let finite = cloud.positions().iter().filter(|position| position.iter().all(|along| along.is_finite()));
         if !settings.adaptive {
             Self::Paper
-        } else if finite.take(MIN_SURFACE_POINTS).count() == MIN_SURFACE_POINTS {
+        } else if finite.take(MIN_SURFACE_POINTS).count() == MIN_SURFACE_POINTS && !are_crowded(cloud, picture) {
             Self::Adaptive
         } else {
-            Self::Dots(settings.splat_scale * DOT_RADIUS_PER_PICTURE_SIDE * size[0].min(size[1]) as f32)
+            let [width, height] = picture.picture_size();
+            Self::Dots(settings.splat_scale * DOT_RADIUS_PER_PICTURE_SIDE * width.min(height) as f32)
         }
     }
+}
+
+/// Whether the points are so far away, in clusters, that many of them hit each of a handful of pixels. Such pixels have
+/// no neighbours that tell anything of a surface.
+fn are_crowded(cloud: &PointCloud, picture: &View) -> bool {
+    let positions = cloud.positions();
+    let step = positions.len().div_ceil(HIT_SAMPLES).max(1);
+    let [width, height] = picture.picture_size().map(|side| side as f32);
+    let mut points = 0;
+    let mut pixels: Vec<[u32; 2]> = Vec::new();
+    for &position in positions.iter().step_by(step) {
+        let place = picture.to_view(position);
+        let [x, y] = picture.to_pixel(place);
+        if !(place.z > picture.near && (0.0..width).contains(&x) && (0.0..height).contains(&y)) {
+            continue;
+        }
+        points += 1;
+        let pixel = [x as u32, y as u32];
+        if !pixels.contains(&pixel) {
+            pixels.push(pixel);
+            if pixels.len() == MIN_SURFACE_POINTS {
+                return false;
+            }
+        }
+    }
+    points >= MIN_CROWD * pixels.len().max(1)
 }
 
 /// What each stage of a frame does.

@@ -12,7 +12,7 @@ impl Renderer {
     /// Values that are set already stay. A recording without that flickers, as each picture has values of its own.
     ///
     /// # Errors
-    /// Those of [`render`](Self::render).
+    /// Those of [`render_while`](Self::render_while), which is given `go_on`.
     ///
     /// # Examples
     ///
@@ -25,7 +25,7 @@ impl Renderer {
     /// let camera = Camera::fit(&cloud, guess_axes(&cloud), ViewDirection::Iso, 1.0, projection)?;
     /// let mut settings = Settings::default();
     /// settings.shading.color = ColorMode::Height;
-    /// Renderer::new().settle(&mut settings, &cloud, &camera, [64, 64])?;
+    /// Renderer::new().settle(&mut settings, &cloud, &camera, [64, 64], &|| true)?;
     /// assert_eq!(settings.shading.exposure, Some(1.0));
     /// assert!(settings.shading.range.is_some_and(|[low, high]| low < high));
     /// # Ok::<(), autosplats::Error>(())
@@ -36,6 +36,7 @@ impl Renderer {
         cloud: &PointCloud,
         camera: &Camera,
         size: [u32; 2],
+        go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), Error> {
         settings.shading.exposure.get_or_insert_with(|| usual_exposure(cloud));
         let has_no_range = matches!(settings.shading.color, ColorMode::Plain | ColorMode::Rgb | ColorMode::Normal);
@@ -43,7 +44,7 @@ impl Renderer {
             let mut trial = settings.clone();
             // No later frame may be averaged with this one.
             trial.reconstruction.frames_averaged = 1;
-            settings.shading.range = self.render(cloud, camera, size, &trial)?.counts.range();
+            settings.shading.range = self.render_while(cloud, camera, size, &trial, go_on)?.counts.range();
         }
         Ok(())
     }
@@ -53,7 +54,7 @@ impl Counts {
     /// The ends of the colour map in this picture, as [`Shading::range`](crate::Shading::range) takes them for others.
     /// `None` without values, or if all are the same.
     #[must_use]
-    pub fn range(&self) -> Option<[f32; 2]> {
-        self.value_range.map(|ends| ends.map(|end| end as f32)).filter(|[low, high]| low < high)
+    pub fn range(&self) -> Option<[f64; 2]> {
+        self.value_range.filter(|[low, high]| low < high)
     }
 }

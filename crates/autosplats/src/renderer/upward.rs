@@ -3,7 +3,7 @@
 use autosplats_cloud::PointCloud;
 use glam::DVec3;
 
-use crate::camera::{guess_axes, up};
+use crate::camera::guess_axes;
 
 /// Cache of the last guess, because guessing sorts the coordinates of 100,000 points.
 #[derive(Clone, Copy, Debug, Default)]
@@ -16,13 +16,13 @@ impl Upward {
     pub(super) fn of(&mut self, cloud: &PointCloud) -> DVec3 {
         // Stated axes are not part of a cloud's identity, so they are not cached.
         if let Some(axes) = cloud.axes() {
-            return up(axes);
+            return axes.up();
         }
         let identity = cloud.identity();
         match self.guessed {
             Some((known, upward)) if known == identity => upward,
             _ => {
-                let upward = up(guess_axes(cloud));
+                let upward = guess_axes(cloud).up();
                 self.guessed = Some((identity, upward));
                 upward
             }

@@ -1,5 +1,6 @@
 //! Shading on the CPU, row by row.
 
+use autosplats_cloud::ValueOrigin;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -23,6 +24,10 @@ pub(super) const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 const BAND_ROWS: usize = 32;
 /// Largest number of pixels sampled to find the usual range of values.
 const RANGE_SAMPLES: usize = 50_000;
+/// Steps of `f32` or of the field's type that rounding and averaging may be off by.
+const NOISE_STEPS: f32 = 16.0;
+/// Least width of a range of values that is found, as a share of the largest value.
+pub(super) const RANGE_NOISE: f32 = NOISE_STEPS * f32::EPSILON;
 
 /// Frame data that shading needs beside the layers.
 #[derive(Clone, Copy, Debug)]
@@ -33,26 +38,57 @@ pub(crate) struct Scene<'a> {
     pub(crate) up: DVec3,
     /// The cloud's origin.
     pub(crate) origin: DVec3,
+    /// World units per unit of the view, of which the layers are too.
+    pub(crate) unit: f64,
     /// Factor on the brightness of the points' own colours.
     pub(crate) exposure: f32,
+    /// What the values of the scalar field are relative to.
+    pub(crate) values: ValueOrigin,
 }
 
 impl Scene<'_> {
     /// Offset from the values that shading computes with to those of the world. Heights are relative to the cloud's
     /// origin, because `f32` cannot resolve them in survey coordinates.
     pub(super) fn value_offset(&self, mode: &ColorMode) -> f64 {
-        if *mode == ColorMode::Height { self.origin.dot(self.up) } else { 0.0 }
+        match mode {
+            ColorMode::Height => self.origin.dot(self.up),
+            ColorMode::Field(_) => self.values.origin,
+            _ => 0.0,
+        }
+    }
+
+    /// Least width of a range of values that is found, beside [`RANGE_NOISE`]: a few steps of the numbers from which
+    /// the values are computed.
+    pub(super) fn value_noise(&self, mode: &ColorMode) -> f32 {
+        match mode {
+            ColorMode::Height => RANGE_NOISE * self.view.eye_local.length(),
+            ColorMode::Curvature => RANGE_NOISE,
+            ColorMode::Field(_) => NOISE_STEPS * self.values.precision as f32,
+            _ => 0.0,
+        }
+    }
+
+    /// A range as found, or its middle twice if it is as narrow as noise: then all values are the same.
+    pub(super) fn range_above_noise(&self, mode: &ColorMode, [low, high]: [f32; 2]) -> [f32; 2] {
+        let noise = self.value_noise(mode).max(RANGE_NOISE * low.abs().max(high.abs()));
+        if high - low > noise { [low, high] } else { [low + 0.5 * (high - low); 2] }
+    }
+
+    /// World units per unit of the values that shading computes with.
+    pub(super) fn value_unit(&self, mode: &ColorMode) -> f64 {
+        let is_length = matches!(mode, ColorMode::Height | ColorMode::Depth | ColorMode::Radius | ColorMode::KRadius);
+        if is_length { self.unit } else { 1.0 }
     }
 
     /// The requested range, in values that shading computes with.
     pub(super) fn given_range(&self, shading: &Shading) -> Option<[f32; 2]> {
-        let offset = self.value_offset(&shading.color);
-        shading.range.map(|range| range.map(|end| (f64::from(end) - offset) as f32))
+        let (offset, unit) = (self.value_offset(&shading.color), self.value_unit(&shading.color));
+        shading.range.map(|range| range.map(|end| (end / unit - offset) as f32))
     }
 
     /// Converts a range of values that shading computes with to values of the world.
     pub(super) fn world_range(&self, mode: &ColorMode, range: [f32; 2]) -> [f64; 2] {
-        range.map(|end| f64::from(end) + self.value_offset(mode))
+        range.map(|end| (f64::from(end) + self.value_offset(mode)) * self.value_unit(mode))
     }
 }
 
@@ -98,7 +134,7 @@ pub(crate) fn shade(
     }
     if let (true, Some(scale)) = (shading.legend, &shader.scale) {
         let encode = |channel| encode(inks.table, channel);
-        legend::draw(image, shading, scale, scene.value_offset(&shading.color), encode);
+        legend::draw(image, shading, scale, |range| scene.world_range(&shading.color, range), encode);
     }
     shader.scale.as_ref().map(|scale| scene.world_range(&shading.color, scale.range()))
 }
@@ -213,7 +249,8 @@ impl<'a> Shader<'a> {
         let given_light = given_light(scene, shading, colored);
         let mut shader = Self { layers, scene, shading, colored, given_light, pairs, edges, scale: None };
         if let Some(map) = shading.color.usual_map() {
-            let range = scene.given_range(shading).unwrap_or_else(|| shader.usual_range());
+            let found = || scene.range_above_noise(&shading.color, shader.usual_range());
+            let range = scene.given_range(shading).unwrap_or_else(found);
             shader.scale = Some(Scale::new(shading.color_map.unwrap_or(map), range));
         }
         shader
@@ -294,7 +331,7 @@ impl<'a> Shader<'a> {
     }
 
     /// The 1st and 99th percentile of the values in the picture.
-    fn usual_range(&self) -> [f32; 2] {
+    pub(super) fn usual_range(&self) -> [f32; 2] {
         let [width, height] = [self.layers.width as usize, self.layers.height as usize];
         let step = sample_step(width * height);
         let samples = (0..width * height).step_by(step).map(|pixel| (pixel % width, pixel / width));

@@ -16,7 +16,7 @@ use super::encode::{ENCODE_STEPS, background, encode_table};
 use super::light::{FILL, KEY};
 use super::{Background, ColorMap, Shading, edges, light, occlusion};
 use crate::Error;
-use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
+use crate::gpu::{Gpu, LARGE_GROUP, Library, Pass, Step, constants, files, passes};
 use crate::project::gpu::Counter;
 use crate::splat::LayerBuffers;
 
@@ -26,7 +26,7 @@ pub(super) const LIBRARY: Library = Library {
     constants: &[
         Counter::CONSTANTS,
         ShownQuantity::CONSTANTS,
-        constants!(in cpu: BACK_COLOR, BACK_LIGHT),
+        constants!(in cpu: BACK_COLOR, BACK_LIGHT, RANGE_NOISE),
         constants!(in edges: EDGE_SEARCH_PX, INNER_NORMAL_PX, MIN_TILT_LOSS),
         constants!(in light: CLAY, FILL_LIGHT, GROUND, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY),
         constants!(in occlusion: FARTHEST_RISE, MAX_FULL_RISE, MIN_RISE, PAIR_COUNT),
@@ -35,7 +35,8 @@ pub(super) const LIBRARY: Library = Library {
             FILL = FILL.to_array(),
             KEY = KEY.to_array(),
             LUMINANCE = LUMINANCE.to_array(),
-            SHADE_GROUP
+            SHADE_GROUP,
+            STRIDE_KEYS
         ],
     ],
 };
@@ -47,12 +48,10 @@ passes! {
     SHADE = "shade",
 }
 
-/// Invocations in a workgroup of `range_values`.
-const GROUP: u32 = 256;
 /// Pixels that a workgroup of `shade` colours.
 const SHADE_GROUP: [u32; 2] = [32, 8];
 /// Keys that `range` reads at a time.
-const KEYS: usize = 4096;
+const STRIDE_KEYS: usize = 4096;
 /// Alignment of the image's rows in pixels: textures are copied in rows of multiples of 256 bytes.
 pub(super) const ROW_PIXELS: u32 = 64;
 
@@ -103,7 +102,7 @@ impl ShadeBuffers {
         Ok(Self {
             size,
             uniform: gpu.uniform::<ShadeUniform>("shading")?,
-            keys: gpu.storage::<u32>("keys of values", samples.next_multiple_of(KEYS))?,
+            keys: gpu.storage::<u32>("keys of values", samples.next_multiple_of(STRIDE_KEYS))?,
             color_map: gpu.storage::<[f32; 4]>("colour map", color_map::STEPS)?,
             tables,
             image: gpu.storage::<u32>("image", pitch(size[0]) as usize * height)?,
@@ -191,7 +190,7 @@ impl ShadePasses {
         };
         let mut steps = Vec::new();
         if finds_range(shading) {
-            let groups = (keys.size() / 4) as u32 / GROUP;
+            let groups = (keys.size() / 4) as u32 / LARGE_GROUP;
             steps.push(passes.range_values.step(gpu, &[frame, uniform, surface, cover, extras, keys], groups));
             steps.push(self.range.step(gpu, &[frame, keys, counters], 1));
         }

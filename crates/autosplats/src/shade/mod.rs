@@ -19,6 +19,7 @@
 //! pictures in memory only.
 
 mod average;
+mod background;
 mod classes;
 mod color_map;
 mod cpu;
@@ -34,9 +35,10 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
+pub use background::Background;
 pub(crate) use classes::class_colors;
 pub(crate) use cpu::{Scene, shade};
-pub use settings::{Background, Backs, ColorMap, ColorMode, Shading};
+pub use settings::{Backs, ColorMap, ColorMode, Shading};
 
 /// An image, rows from the top.
 ///

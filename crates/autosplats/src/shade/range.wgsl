@@ -9,7 +9,7 @@
 #import frame
 #import range_keys
 
-// Keys, padded with `NO_KEY` to a multiple of 1024 vectors.
+// Keys, padded with `NO_KEY` to a multiple of `STRIDE_KEYS`.
 @group(0) @binding(1) var<storage, read> keys: array<vec4u>;
 @group(0) @binding(2) var<storage, read_write> counters: array<u32>;
 
@@ -64,7 +64,7 @@ fn extend_by_four(run: Run, four: vec4u, round: Round) -> Run {
 
 @compute @workgroup_size(256)
 fn range(@builtin(local_invocation_index) local: u32) {
-    let strides = arrayLength(&keys) / 1024u;
+    let strides = arrayLength(&keys) / (STRIDE_KEYS / 4u);
     var begins = vec2u(0u);
     for (var byte = 0u; byte < 4u; byte++) {
         let round = Round(24u - 8u * byte, begins, begins.x == begins.y);
@@ -76,7 +76,7 @@ fn range(@builtin(local_invocation_index) local: u32) {
         var run = Run(0u, 0u);
         for (var stride = 0u; stride < strides; stride++) {
             // Sixteen keys are in flight at a time.
-            let first = stride * 1024u + local;
+            let first = stride * (STRIDE_KEYS / 4u) + local;
             let a = keys[first];
             let b = keys[first + 256u];
             let c = keys[first + 512u];

@@ -14,9 +14,9 @@
 @group(0) @binding(4) var<storage, read> extras: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> keys: array<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn range_values(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let sample = group_index(workgroup) * 256u + local;
+    let sample = group_index(workgroup) * LARGE_GROUP + local;
     if sample >= arrayLength(&keys) {
         return;
     }

@@ -1,5 +1,7 @@
 //! Settings of shading.
 
+use super::Background;
+
 /// How splats become an image.
 ///
 /// # Examples
@@ -32,7 +34,7 @@ pub struct Shading {
     /// Source of the surface's colour.
     pub color: ColorMode,
     /// World values at the two ends of the colour map; `None` takes the 1st and 99th percentile of the picture.
-    pub range: Option<[f32; 2]>,
+    pub range: Option<[f64; 2]>,
     /// Colour map for values; `None` takes the usual one of the colour mode.
     pub color_map: Option<ColorMap>,
     /// Draw the colour map with its range into the picture, if the colour mode has one.
@@ -155,18 +157,6 @@ pub enum ColorMap {
     Gray,
     /// Pale grey over orange to dark red: the high end is a warning. The usual one for radii.
     Reds,
-}
-
-/// What to show where no surface is. Colours are sRGB, 8 bits a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Background {
-    /// One colour.
-    Color([u8; 3]),
-    /// From the first colour at the top to the second at the bottom.
-    Gradient([u8; 3], [u8; 3]),
-    /// Nothing: alpha is 0.
-    Transparent,
 }
 
 impl Default for Shading {

@@ -25,15 +25,17 @@
 // Whether backs are toned.
 override BACKS: bool;
 
-// The linear colour of a value. An unknown value gets the colour of the lower end; in a range without width every value
-// gets the middle colour.
+// The linear colour of a value. An unknown value gets the colour of the lower end; in a range as narrow as noise every
+// value gets the middle colour.
 fn map_color(value: f32) -> vec3f {
     var range = shading.range;
+    var noise = 0.0;
     if shading.find_range == 1u {
         range = vec2f(bitcast<f32>(counters[RANGE_LOW]), bitcast<f32>(counters[RANGE_HIGH]));
+        noise = max(shading.value_noise, RANGE_NOISE * max(abs(range.x), abs(range.y)));
     }
     var t = 0.5;
-    if range.y > range.x {
+    if range.y - range.x > noise {
         t = (value - range.x) / (range.y - range.x);
     }
     return color_map[table_step(t, arrayLength(&color_map) - 1u)].rgb;

@@ -2,7 +2,7 @@
 
 mod truth;
 
-use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::{ValueOrigin, glam::DVec3};
 
 use super::*;
 use crate::camera::{Camera, Projection, View};
@@ -41,7 +41,8 @@ fn shaded(layers: &GBuffer, shading: &Shading) -> Image {
 fn exposed(layers: &GBuffer, shading: &Shading, exposure: f32) -> Image {
     let view = view([layers.width, layers.height]);
     let mut image = Image::default();
-    let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure };
+    let scene =
+        Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, unit: 1.0, exposure, values: ValueOrigin::default() };
     let _ = shade(layers, &scene, shading, true, None, &mut image, &crate::cancel::NEVER);
     assert_eq!(image.pixels.len(), (layers.width * layers.height) as usize, "size of the image");
     image
@@ -127,7 +128,7 @@ fn the_range_that_was_shown_is_told() {
     let range = |shading: &Shading, origin: DVec3| {
         shade(
             &layers,
-            &Scene { view: &view, up: DVec3::Y, origin, exposure: 1.0 },
+            &Scene { view: &view, up: DVec3::Y, origin, unit: 1.0, exposure: 1.0, values: ValueOrigin::default() },
             shading,
             false,
             None,

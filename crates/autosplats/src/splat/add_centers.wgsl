@@ -12,9 +12,9 @@
 @group(0) @binding(3) var<storage, read> tree: array<vec2u>;
 @group(0) @binding(4) var<storage, read_write> centers: array<atomic<u32>>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn add_centers(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= counters[ACTIVE] + counters[RECOVERED] || is_empty(living_bounds(tree[level_start(SPLATS) + index])) {
         return;
     }

@@ -1,6 +1,6 @@
 //! Attributes of splats: the channels that they carry, and their sums over a tile.
 
-use autosplats_cloud::FieldValues;
+use autosplats_cloud::RelativeValues;
 
 use super::TILE_AREA;
 use super::layers::{Channels, TileLayers};
@@ -13,7 +13,7 @@ pub(super) const CHANNELS: usize = 12;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Attributes<'a> {
     pub(crate) color: Option<PointColors<'a>>,
-    pub(crate) scalar: Option<&'a FieldValues>,
+    pub(crate) scalar: Option<RelativeValues<'a>>,
     /// Splat radius, k-radius and curvature.
     pub(crate) measures: bool,
     /// Share of the surface's back.
@@ -54,7 +54,7 @@ impl Attributes<'_> {
             }
         }
         if let Some(field) = self.scalar {
-            let value = field.get(surfel.source as usize) as f32;
+            let value = field.get(surfel.source as usize);
             let known = value.is_finite();
             values[next] = if known { value } else { 0.0 };
             values[next + 1] = f32::from(known);

@@ -12,7 +12,7 @@
 // Bounds of the sixteen runs and, last, of the top: least column and row, greatest column and row.
 var<workgroup> sides: array<atomic<u32>, 68>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn boxes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let top = group_index(workgroup);
     let end = counters[ACTIVE] + counters[RECOVERED];

@@ -8,9 +8,9 @@
 
 @group(0) @binding(1) var<storage, read_write> depth_map: array<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn clear_depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let at = group_index(workgroup) * 256u + local;
+    let at = group_index(workgroup) * LARGE_GROUP + local;
     if at < arrayLength(&depth_map) {
         depth_map[at] = depth_key(infinity());
     }

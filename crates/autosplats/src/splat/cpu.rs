@@ -109,6 +109,7 @@ impl Splatter {
         if !layers.resize(view, depth.len(), attributes.optional()) {
             empty.clear();
         }
+        layers.scalar_about = attributes.scalar.map(|values| values.about()).unwrap_or_default();
         rims.resize(depth.len(), 0.0);
         centers.resize(depth.len(), 0);
         empty.resize(depth.len() / TILE_AREA, false);

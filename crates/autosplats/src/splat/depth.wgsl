@@ -17,9 +17,9 @@
 override RECOVERED_ONLY: bool;
 override MAX_INVOCATION_PX: u32;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = select(0u, counters[ACTIVE], RECOVERED_ONLY) + group_index(workgroup) * 256u + local;
+    let index = select(0u, counters[ACTIVE], RECOVERED_ONLY) + group_index(workgroup) * LARGE_GROUP + local;
     if index >= counters[ACTIVE] + counters[RECOVERED] {
         return;
     }

@@ -20,7 +20,7 @@
 override RECOVERED_ONLY: bool;
 override REDRAWN_ONLY: bool;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn depth_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let place = group_index(workgroup);
     if place >= counters[LARGE] {

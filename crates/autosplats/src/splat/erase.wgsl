@@ -19,9 +19,9 @@
 
 override MAX_INVOCATION_PX: u32;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn erase(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= counters[ACTIVE] + counters[RECOVERED] || changes[index] != DIED {
         return;
     }

@@ -17,7 +17,7 @@
 @group(0) @binding(6) var<storage, read_write> depth_map: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read_write> cells: array<atomic<u32>>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn erase_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let place = group_index(workgroup);
     if place >= counters[LARGE] {

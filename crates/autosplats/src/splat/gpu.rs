@@ -18,7 +18,7 @@ use super::{centers, raster, setup};
 use crate::Error;
 use crate::adapt::FrameStatistics;
 use crate::fit::{SUPPORT, Surfel};
-use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
+use crate::gpu::{Gpu, LARGE_GROUP, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
 use crate::project::MARGIN_REACH;
 use crate::project::gpu::{Counter, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, WorkPass, scan_pass};
 
@@ -287,7 +287,7 @@ impl SplatPasses {
         let all = || screen.groups(Work::Queries256);
         let larges = || screen.groups(Work::LargeSplats);
         [
-            self.clear_words.step(gpu, &[frame, marks], cells(screen.size).div_ceil(256)),
+            self.clear_words.step(gpu, &[frame, marks], cells(screen.size).div_ceil(LARGE_GROUP)),
             self.refine.step(gpu, &[frame, counters, list, depth, tree, changes], all()),
             self.erase.step(gpu, &[frame, counters, list, tree, changes, depth, marks], all()),
             self.erase_large.step(gpu, &[frame, counters, list, tree, changes, large, depth, marks], larges()),
@@ -344,7 +344,7 @@ impl SplatPasses {
             let all = screen.groups(Work::Queries256);
             steps.push(self.add_centers.step(gpu, &[frame, counters, list, tree, centers], all));
             let blocks = [frame, cover, sixteenths, noise, summed];
-            steps.push(self.sum_blocks.step(gpu, &blocks, block_count(screen.size).div_ceil(64)));
+            steps.push(self.sum_blocks.step(gpu, &blocks, block_count(screen.size).div_ceil(SMALL_GROUP)));
         }
         let trim = [frame, surface, cover, extras, counters, centers, sixteenths, noise, summed];
         let pass = &self.trim[usize::from(rules.trim)];
@@ -370,7 +370,7 @@ fn block_count(size: [u32; 2]) -> u32 {
 
 /// Workgroups with an invocation per pixel.
 fn pixel_groups(screen: &ScreenBuffers) -> u32 {
-    (screen.size[0] * screen.size[1]).div_ceil(256)
+    (screen.size[0] * screen.size[1]).div_ceil(LARGE_GROUP)
 }
 
 /// Workgroups for rectangles of this many columns and rows.

@@ -1,5 +1,7 @@
 //! Layers on the host, tile by tile; layers on the device; and the conversion of these to the host's form.
 
+use autosplats_cloud::ValueOrigin;
+
 use super::{GBuffer, TILE_AREA, tile_columns, tiled_index};
 use crate::Error;
 use crate::camera::View;
@@ -212,6 +214,7 @@ impl LayerBuffers {
             point: vec![u32::MAX; area],
             color: vec![[0.0; 3]; wanted(color)],
             scalar: vec![f32::NAN; wanted(scalar)],
+            scalar_about: ValueOrigin::default(),
             radius: vec![0.0; wanted(measures)],
             k_radius: vec![0.0; wanted(measures)],
             curvature: vec![0.0; wanted(measures)],

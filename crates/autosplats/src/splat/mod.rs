@@ -24,6 +24,8 @@ mod setup;
 mod tests;
 mod trim;
 
+use autosplats_cloud::ValueOrigin;
+
 pub(crate) use attributes::{Attributes, PointColors};
 pub(crate) use cpu::Splatter;
 pub(crate) use layers::{Channels, LayerBuffers};
@@ -82,8 +84,10 @@ pub struct GBuffer {
     pub point: Vec<u32>,
     /// Colour of the points, linear RGB, 0 to 1.
     pub color: Vec<[f32; 3]>,
-    /// Mean of the requested scalar field.
+    /// Mean of the requested scalar field, relative to [`scalar_about`](Self::scalar_about).
     pub scalar: Vec<f32>,
+    /// What values of the scalar field are relative to.
+    pub scalar_about: ValueOrigin,
     /// Mean splat radius in world units.
     pub radius: Vec<f32>,
     /// Mean k-radius in world units.

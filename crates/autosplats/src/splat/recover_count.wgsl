@@ -20,7 +20,7 @@
 
 var<workgroup> recovered_points: atomic<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn recover_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         atomicStore(&recovered_points, 0u);
@@ -30,8 +30,8 @@ fn recover_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocat
     let cell_px = counters[CELL_PX];
     let cell_columns = counters[CELL_COLUMNS];
     var own = 0u;
-    for (var step = 0u; step < RANK_BLOCK_FLAGS / 256u; step++) {
-        let index = block * RANK_BLOCK_FLAGS + step * 256u + local;
+    for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
+        let index = block * RANK_BLOCK_FLAGS + step * LARGE_GROUP + local;
         if index < counters[PASSIVE] {
             let passive_point = passive[index];
             let point = points[passive_point];

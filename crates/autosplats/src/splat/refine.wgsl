@@ -14,9 +14,9 @@
 @group(0) @binding(4) var<storage, read_write> tree: array<vec2u>;
 @group(0) @binding(5) var<storage, read_write> changes: array<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn refine(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= counters[ACTIVE] + counters[RECOVERED] {
         return;
     }

@@ -22,11 +22,11 @@ override MAX_INVOCATION_PX: u32;
 // Empty bounds: the first pixel lies beyond all, the last is 0.
 const NOWHERE = 0x7fffu;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let active_points = atomicLoad(&counters[ACTIVE]);
     let first = select(0u, active_points, RECOVERED_ONLY);
-    let index = first + group_index(workgroup) * 256u + local;
+    let index = first + group_index(workgroup) * LARGE_GROUP + local;
     if index >= active_points + atomicLoad(&counters[RECOVERED]) {
         return;
     }

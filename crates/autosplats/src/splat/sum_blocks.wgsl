@@ -15,9 +15,9 @@
 @group(0) @binding(3) var<storage, read> statistics: FrameStatistics;
 @group(0) @binding(4) var<storage, read_write> blocks: array<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn sum_blocks(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let at = group_index(workgroup) * 64u + local;
+    let at = group_index(workgroup) * SMALL_GROUP + local;
     let all = block_counts();
     if !(statistics.noise.level > 0.0) || at >= all.x * all.y {
         return;

@@ -1,7 +1,7 @@
 //! Splatting against an oracle: the intersection of each pixel's line of sight with each disc, in `f64`.
 
-use autosplats_cloud::FieldValues;
 use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::{FieldValues, RelativeValues};
 
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, MAX_AXIS_PER_DEPTH, MIN_FACING_COSINE};
 use super::{Attributes, GBuffer, PointColors, Splatter};
@@ -187,7 +187,8 @@ pub(super) fn sixteenths(surfels: &[Surfel], view: &View) -> Sixteenths {
 fn draw(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> GBuffer {
     let scalars = FieldValues::F32(data.scalars.clone());
     let color = PointColors { srgb: &data.colors, linear: &data.linear };
-    let attributes = Attributes { color: Some(color), scalar: Some(&scalars), measures: true, backs: true };
+    let attributes =
+        Attributes { color: Some(color), scalar: Some(RelativeValues::new(&scalars)), measures: true, backs: true };
     draw_with(&mut Splatter::default(), surfels, view, refinements, &attributes)
 }
 
@@ -408,7 +409,7 @@ fn nothing_is_left_of_frames_before() {
     let color = PointColors { srgb: &data.colors, linear: &data.linear };
     let bare = Attributes { color: Some(color), ..Attributes::default() };
     let scalars = FieldValues::F32(data.scalars.clone());
-    let all = Attributes { scalar: Some(&scalars), measures: true, backs: true, ..bare };
+    let all = Attributes { scalar: Some(RelativeValues::new(&scalars)), measures: true, backs: true, ..bare };
     let mut splatter = Splatter::default();
     // Tiles become empty, stay so while layers are added, are filled again, and are replaced by those of another
     // picture.

@@ -23,7 +23,6 @@
 // 1 to trim, 0 only to count covered pixels.
 override TRIMS: u32;
 
-const GROUP = 64u;
 // Side of the square of a workgroup, with the pixels around that its border tests read.
 const WIDE = SQUARE + 2u * MARGIN;
 // Blocks around the square's that show whether a fringe meets emptiness, one more than its width; and the side of the
@@ -47,17 +46,17 @@ var<workgroup> is_any_empty: atomic<u32>;
 // Masks of the sixteenths ahead in each direction, then those behind: two words of four rows each.
 var<workgroup> sides: array<vec2u, 2u * DIRECTIONS>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         atomicStore(&covered, 0u);
         atomicStore(&tail_count, 0u);
         atomicStore(&is_any_empty, 0u);
     }
-    for (var word = local; word < 2u * WIDE; word += GROUP) {
+    for (var word = local; word < 2u * WIDE; word += SMALL_GROUP) {
         atomicStore(&empties[word], 0u);
     }
-    for (var word = local; word < 2u * WIDE_BLOCKS; word += GROUP) {
+    for (var word = local; word < 2u * WIDE_BLOCKS; word += SMALL_GROUP) {
         atomicStore(&empty_blocks[word], 0u);
     }
     if local < 2u * DIRECTIONS {
@@ -67,7 +66,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     let columns = (frame.size.x + SQUARE - 1u) / SQUARE;
     let group = group_index(workgroup);
     let corner = SQUARE * vec2u(group % columns, group / columns);
-    for (var place = local; place < WIDE * WIDE; place += GROUP) {
+    for (var place = local; place < WIDE * WIDE; place += SMALL_GROUP) {
         let at = vec2u(place % WIDE, place / WIDE);
         // Unsigned wrap-around moves pixels before the first far beyond the last.
         let pixel = corner + at - MARGIN;
@@ -76,7 +75,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         }
     }
     if statistics.noise.level > 0.0 {
-        for (var place = local; place < WIDE_BLOCKS * WIDE_BLOCKS; place += GROUP) {
+        for (var place = local; place < WIDE_BLOCKS * WIDE_BLOCKS; place += SMALL_GROUP) {
             let at = vec2u(place % WIDE_BLOCKS, place / WIDE_BLOCKS);
             // Unsigned wrap-around moves blocks before the first far beyond the last.
             let block = corner / BLOCK_PX + at - BLOCK_MARGIN;
@@ -95,7 +94,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     }
     workgroupBarrier();
     var stay = 0u;
-    for (var place = local; place < SQUARE * SQUARE; place += GROUP) {
+    for (var place = local; place < SQUARE * SQUARE; place += SMALL_GROUP) {
         let at = vec2u(place % SQUARE, place / SQUARE);
         let pixel = corner + at;
         if all(pixel < frame.size) {
@@ -109,7 +108,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     // One invocation may clear a pixel that another has read.
     storageBarrier();
     workgroupBarrier();
-    for (var tail = local; tail < atomicLoad(&tail_count); tail += GROUP) {
+    for (var tail = local; tail < atomicLoad(&tail_count); tail += SMALL_GROUP) {
         let place = vec2u(tails[tail] % SQUARE, tails[tail] / SQUARE);
         let pixel = corner + place;
         let at = pixel.y * frame.size.x + pixel.x;

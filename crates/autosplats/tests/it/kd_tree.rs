@@ -85,14 +85,15 @@ fn the_best_radius_is_accurate() {
     let Some(mut gpu) = crate::gpu() else { return };
     let cloud = cloud(crate::test_clouds::sphere(8000));
     for k in [1, 10] {
-        let best = best_first_radius(&mut gpu, &cloud, &CAMERA, SIZE, &kd_tree(1.0, k), 0.99).expect("a radius");
+        let best =
+            best_first_radius(&mut gpu, &cloud, &CAMERA, SIZE, &kd_tree(1.0, k), 0.99, &|| true).expect("a radius");
         assert!(best.accuracy >= 0.99, "k = {k}: {best:?}");
         assert!((0.01..1.0).contains(&best.first_radius) && best.search_ms > 0.0, "k = {k}: {best:?}");
     }
-    let none = best_first_radius(&mut gpu, &cloud, &CAMERA, SIZE, &kd_tree(1.0, 10), 1.1).expect("a radius");
+    let none = best_first_radius(&mut gpu, &cloud, &CAMERA, SIZE, &kd_tree(1.0, 10), 1.1, &|| true).expect("a radius");
     assert!(none.accuracy > 0.9, "the most accurate where none suffices: {none:?}");
     let behind = self::cloud(crate::test_clouds::behind(100));
-    let nothing = best_first_radius(&mut gpu, &behind, &CAMERA, SIZE, &kd_tree(1.0, 10), 0.99);
+    let nothing = best_first_radius(&mut gpu, &behind, &CAMERA, SIZE, &kd_tree(1.0, 10), 0.99, &|| true);
     assert!(matches!(nothing, Err(Error::NothingVisible(_))), "{nothing:?}");
 }
 

@@ -6,8 +6,11 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 use autosplats::{Backend, Error, Renderer};
 
 mod backends;
+mod extremes;
+mod first_view;
 mod kd_tree;
 mod properties;
+mod ranges;
 mod sensors;
 mod smoothing;
 mod surfels;

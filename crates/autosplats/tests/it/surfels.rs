@@ -112,6 +112,14 @@ fn a_frame_that_is_given_up_leaves_nothing_behind() {
 }
 
 #[test]
+fn what_recordings_share_is_given_up_too() {
+    let mut settings = Settings::default();
+    settings.shading.color = ColorMode::Height;
+    let failed = Renderer::new().settle(&mut settings, &sphere(), &camera(), SIZE, &|| false);
+    assert!(matches!(failed, Err(Error::Cancelled)) && settings.shading.range.is_none(), "{failed:?}");
+}
+
+#[test]
 fn both_backends_hand_out_the_same_surfels() {
     let Some(mut gpu) = crate::gpu() else { return };
     let cloud = sphere();

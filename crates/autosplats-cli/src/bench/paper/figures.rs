@@ -42,10 +42,10 @@ pub(super) struct Radii {
 
 /// Renders the scene as measured, at half the size.
 pub(super) fn picture(loaded: &LoadedScene<'_>, path: &Path, console: &Console) -> Result<(), Failure> {
-    let LoadedScene { scene, cloud, camera } = loaded;
+    let LoadedScene { scene, cloud, camera, .. } = loaded;
     let size = scene.size.map(|side| side / 2);
     let mut renderer = Renderer::new();
-    let frame = renderer.render(cloud, camera, size, &Settings::default())?;
+    let frame = renderer.render_while(cloud, camera, size, &Settings::default(), &console.goes_on())?;
     write_file(path, console, |writer| write_png(frame.image, false, writer)).map(|_| ())
 }
 
@@ -61,8 +61,8 @@ pub(super) fn normals(
     let settings = Settings::default();
     let mut renderer = Renderer::new();
     let normal_settings = NormalSettings { k: K, ..NormalSettings::default() };
-    let beforehand = estimate_normals(cloud, &normal_settings, &())?;
-    let on_the_fly = renderer.render(cloud, camera, size, &settings)?.image.clone();
+    let beforehand = estimate_normals(cloud, &normal_settings, console.interrupt())?;
+    let on_the_fly = renderer.render_while(cloud, camera, size, &settings, &console.goes_on())?.image.clone();
     let surfels = renderer.surfels()?;
     let angle = |surfel: &autosplats::PointSurfel| {
         let known = Vec3::from(beforehand.normals[surfel.point as usize]);
@@ -110,7 +110,7 @@ pub(super) fn scales(count: usize, side: u32, path: &Path, console: &Console) ->
     let mut images = Vec::new();
     let mut medians = [0.0; 2];
     for (camera, settings) in [(&camera, &plain), (&camera, &colored), (&camera, &apart), (&near, &apart)] {
-        let frame = renderer.render(&cloud, camera, [side, side], settings)?;
+        let frame = renderer.render_while(&cloud, camera, [side, side], settings, &console.goes_on())?;
         images.push(frame.image.clone());
         let wants_small = std::ptr::eq(camera, &near);
         let surfels = renderer.surfels()?;
@@ -135,7 +135,7 @@ pub(super) fn curvature(loaded: &LoadedScene<'_>, side: u32, path: &Path, consol
     let mut renderer = Renderer::new();
     let mut images = Vec::new();
     for (camera, settings) in [(camera, &Settings::default()), (&near, &Settings::default()), (&near, &colored)] {
-        let frame = renderer.render(cloud, camera, [side, side * 3 / 2], settings)?;
+        let frame = renderer.render_while(cloud, camera, [side, side * 3 / 2], settings, &console.goes_on())?;
         images.push(frame.image.clone());
     }
     write_side_by_side(&images.iter().collect::<Vec<_>>(), path, console)

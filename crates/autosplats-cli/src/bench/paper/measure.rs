@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::scenes::PaperScene;
 use crate::bench::{TREE_BUILD_PREFIX, median};
+use crate::console::Console;
 use crate::device::Device;
 use crate::exit::Failure;
 use crate::first_radius::ACCURACY;
@@ -158,11 +159,11 @@ impl Renderers {
 }
 
 /// A scene ready for rendering.
-#[derive(Debug)]
 pub(super) struct LoadedScene<'a> {
     pub(super) scene: &'a PaperScene,
     pub(super) cloud: PointCloud,
     pub(super) camera: Camera,
+    pub(super) console: &'a Console,
 }
 
 /// Settings of a measurement: those of the paper with these values.
@@ -189,7 +190,7 @@ pub(super) fn time(
     settings: &Settings,
     frames: usize,
 ) -> Result<Outcome<Timing>, Failure> {
-    let LoadedScene { scene, cloud, camera } = loaded;
+    let LoadedScene { scene, cloud, camera, console } = loaded;
     let renderer = match renderers.of(method) {
         Ok(renderer) => renderer,
         Err(why) => return Ok(Err(why)),
@@ -198,7 +199,7 @@ pub(super) fn time(
     let mut counts = Counts::default();
     // The first frame creates the buffers and is not counted, unless it is slow.
     for frame in 0..=frames {
-        let rendered = match outcome(renderer.render(cloud, camera, scene.size, settings))? {
+        let rendered = match outcome(renderer.render_while(cloud, camera, scene.size, settings, &console.goes_on()))? {
             Ok(rendered) => rendered,
             Err(why) => return Ok(Err(why)),
         };
@@ -239,13 +240,14 @@ pub(super) fn first_radius(
     renderers: &mut Renderers,
     loaded: &LoadedScene<'_>,
 ) -> Result<Outcome<FirstRadius>, Failure> {
-    let LoadedScene { scene, cloud, camera } = loaded;
+    let LoadedScene { scene, cloud, camera, console } = loaded;
     let renderer = match renderers.of(Method::KdTree) {
         Ok(renderer) => renderer,
         Err(why) => return Ok(Err(why)),
     };
     let settings = settings(Method::KdTree, f32::NAN, K, false);
-    let best = outcome(best_first_radius(renderer, cloud, camera, scene.size, &settings, ACCURACY))?;
+    let best =
+        outcome(best_first_radius(renderer, cloud, camera, scene.size, &settings, ACCURACY, &console.goes_on()))?;
     Ok(best.map(|RadiusTrial { first_radius, accuracy, .. }| FirstRadius { radius: first_radius, accuracy }))
 }
 
@@ -266,21 +268,21 @@ pub(super) struct ExactRadii {
 impl ExactRadii {
     /// Computes the radii with a kd-tree of the visible points and one of all points.
     pub(super) fn new(renderers: &mut Renderers, loaded: &LoadedScene<'_>) -> Result<Self, Failure> {
-        let LoadedScene { scene, cloud, camera } = loaded;
+        let LoadedScene { scene, cloud, camera, console } = loaded;
         let settings = settings(Method::GridCpu, f32::NAN, K, false);
-        renderers.cpu.render(cloud, camera, scene.size, &settings)?;
+        renderers.cpu.render_while(cloud, camera, scene.size, &settings, &console.goes_on())?;
         let mut visible: Vec<u32> = renderers.cpu.surfels()?.iter().map(|surfel| surfel.point).collect();
         visible.sort_unstable();
         let positions = visible.iter().map(|&point| cloud.positions()[point as usize]).collect();
         let seen = PointCloud::new(cloud.origin(), positions);
-        Ok(Self { on_screen: exact_radii(&seen)?, in_space: exact_radii(cloud)?, visible })
+        Ok(Self { on_screen: exact_radii(&seen, console)?, in_space: exact_radii(cloud, console)?, visible })
     }
 }
 
 /// Distance of each point to its k-th neighbour.
-fn exact_radii(cloud: &PointCloud) -> Result<Vec<f32>, Failure> {
+fn exact_radii(cloud: &PointCloud, console: &Console) -> Result<Vec<f32>, Failure> {
     let settings = NormalSettings { k: K, ..NormalSettings::default() };
-    let normals = estimate_normals(cloud, &settings, &())?;
+    let normals = estimate_normals(cloud, &settings, console.interrupt())?;
     // The density radius is 2·√(r²/k).
     Ok(normals.radius.into_iter().map(|radius| 0.5 * radius * (K as f32).sqrt()).collect())
 }
@@ -298,13 +300,13 @@ pub(super) fn accuracy(
     first_radius: f32,
     exact: &ExactRadii,
 ) -> Result<Outcome<Accuracy>, Failure> {
-    let LoadedScene { scene, cloud, camera } = loaded;
+    let LoadedScene { scene, cloud, camera, console } = loaded;
     let renderer = match renderers.of(method) {
         Ok(renderer) => renderer,
         Err(why) => return Ok(Err(why)),
     };
     let settings = settings(method, first_radius, K, false);
-    let counts = match outcome(renderer.render(cloud, camera, scene.size, &settings))? {
+    let counts = match outcome(renderer.render_while(cloud, camera, scene.size, &settings, &console.goes_on()))? {
         Ok(frame) => frame.counts,
         Err(why) => return Ok(Err(why)),
     };
@@ -349,11 +351,11 @@ fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
 
 /// Fraction of the pixels that look different with grid culling.
 pub(super) fn culling_difference(renderers: &mut Renderers, loaded: &LoadedScene<'_>) -> Result<f64, Failure> {
-    let LoadedScene { scene, cloud, camera } = loaded;
+    let LoadedScene { scene, cloud, camera, console } = loaded;
     let mut images: Vec<Image> = Vec::new();
     for culled in [false, true] {
         let settings = settings(Method::GridCpu, f32::NAN, K, culled);
-        let frame = renderers.cpu.render(cloud, camera, scene.size, &settings)?;
+        let frame = renderers.cpu.render_while(cloud, camera, scene.size, &settings, &console.goes_on())?;
         images.push(frame.image.clone());
     }
     let differs = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > MAX_LEVEL_DIFFERENCE);

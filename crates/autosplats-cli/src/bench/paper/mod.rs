@@ -183,7 +183,7 @@ pub(crate) fn run(args: &PaperArgs, console: &Console) -> Result<(), Failure> {
             continue;
         }
         let (cloud, camera) = scene.load(console)?;
-        let loaded = LoadedScene { scene, cloud, camera };
+        let loaded = LoadedScene { scene, cloud, camera, console };
         let mut exact = None;
         for task in tasks {
             let bar = Bar::new(&format!("{}: {}", scene.name, task.describe()), console);

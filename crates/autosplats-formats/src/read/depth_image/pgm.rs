@@ -20,7 +20,7 @@ pub(super) fn recognised(bytes: &[u8]) -> bool {
 }
 
 /// The next word between blanks and comments, and the byte after it.
-fn word(bytes: &[u8], mut at: usize) -> (&[u8], usize) {
+pub(super) fn word(bytes: &[u8], mut at: usize) -> (&[u8], usize) {
     while let Some(&byte) = bytes.get(at) {
         match byte {
             b'#' => at += bytes[at..].iter().position(|&byte| byte == b'\n').unwrap_or(bytes.len() - at),
@@ -33,7 +33,7 @@ fn word(bytes: &[u8], mut at: usize) -> (&[u8], usize) {
     (&rest[..len], at + len)
 }
 
-fn number(word: &[u8]) -> Option<usize> {
+pub(super) fn number(word: &[u8]) -> Option<usize> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 

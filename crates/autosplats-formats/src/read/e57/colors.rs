@@ -8,6 +8,7 @@ use super::{
     element::Stored,
     source::Source,
 };
+use crate::color_scale::ColorScale;
 
 /// Colour of the points of a scan without colours, if another scan has colours.
 const GREY: [u8; 3] = [200; 3];
@@ -42,20 +43,12 @@ impl<'a> Colors<'a> {
         }
         let wide = colors.limits.iter().any(|limits| limits[1] > 255.0);
         if unknown || wide {
-            let largest = |i: usize| (0..3).map(|channel| colors.value(channel, i)).fold(0.0, f64::max);
-            let largest = (0..source.len()).into_par_iter().map(largest).reduce(|| 0.0, f64::max);
-            if unknown {
-                let full = if largest <= 1.0 {
-                    1.0
-                } else if largest <= 255.0 {
-                    255.0
-                } else {
-                    65535.0
-                };
-                colors.limits = [[0.0, full]; 3];
-            } else if largest <= 255.0 && largest > 1.0 {
-                job.note("colour limits exceed 255, but no value does; read as 8 bits");
-                colors.limits = [[0.0, 255.0]; 3];
+            let scale = ColorScale::of(source.len(), true, |i| [0, 1, 2].map(|channel| colors.value(channel, i)));
+            if unknown || scale.full() == 255.0 {
+                let narrow = "colour limits exceed 255, but no value does; read as 8 bits";
+                let note = scale.note().or_else(|| (!unknown).then(|| narrow.to_owned()));
+                note.iter().for_each(|note| job.note(note));
+                colors.limits = [[0.0, scale.full()]; 3];
             }
         }
         Some(colors)

@@ -161,3 +161,14 @@ fn headers_that_lie_are_refused_before_their_bytes_have_come() {
     let endless = [b"# .PCD v0.7\n".repeat(100_000), good.clone()].concat();
     assert_eq!(refused(&found(&endless, 1 << 16)).len(), 1, "a header without end");
 }
+
+#[test]
+fn byte_order_marks_before_files_are_skipped() {
+    let file = ply("ascii", "\n", 0, b"0 0 0\n1 1 1\n");
+    let stream = [b"\xef\xbb\xbf", &file[..], b"\n\xef\xbb\xbf", &file[..]].concat();
+    for piece in [1, 2, 5, stream.len()] {
+        let all = found(&stream, piece);
+        assert!(all.iter().all(|found| matches!(found, Found::File(_, bytes) if *bytes == file)), "pieces of {piece}");
+        assert_eq!(all.len(), 2, "pieces of {piece}");
+    }
+}

@@ -270,8 +270,7 @@ impl<'a> Container<'a> {
             if bytes.is_empty() {
                 return Err(job.malformed("byte 0", "the file is empty; copy it again"));
             }
-            let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-            return Ok(Self { binary: false, json, chunk: None });
+            return Ok(Self { binary: false, json: bytes, chunk: None });
         }
         let word = |at: usize| bytes.get(at..at + 4).map(|raw| u32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]]));
         let cut = |what: &str| {

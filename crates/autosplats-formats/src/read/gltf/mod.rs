@@ -28,6 +28,7 @@ use super::{
     mesh::{self, Faces},
     table::{ProgressRange, reserve},
 };
+use crate::color_scale::ColorScale;
 
 pub(super) const FORMAT: Format = Format {
     name: "glTF",
@@ -100,6 +101,9 @@ pub(super) fn read_at(job: &Job<'_>, seconds: Option<f64>) -> Result<Contents, E
             add_faces(&scene, shown, &mut faces)?;
         }
     }
+    if let Some(full) = points.full {
+        job.note(format!("the colours are in 0 to {full}, not in 0 to 1; read as such"));
+    }
     let mut cloud = mesh::cloud(job, &points.positions, 0.7)?.with_axes(Axes::YUp).with_crs(crs());
     if let Some(colors) = &points.colors {
         cloud = mesh::with_colors(job, cloud, |i| colors[i].map(|value| f32::from(value) / 65535.0))?;
@@ -169,6 +173,8 @@ struct Points {
     positions: Vec<[f64; 3]>,
     /// 16-bit sRGB, if any primitive has colours.
     colors: Option<Vec<[u16; 3]>>,
+    /// Full brightness of colours that are not in 0 to 1.
+    full: Option<f32>,
     /// Present if all primitives have normals.
     normals: Option<[Vec<f32>; 3]>,
 }
@@ -188,7 +194,7 @@ impl Points {
         reserve(&mut positions, plan.points, what)?;
         colors.iter_mut().try_for_each(|colors| reserve(colors, plan.points, what))?;
         normals.iter_mut().flatten().try_for_each(|axis| reserve(axis, plan.points, what))?;
-        Ok(Self { positions, colors, normals })
+        Ok(Self { positions, colors, full: None, normals })
     }
 
     fn add(&mut self, scene: &Scene<'_>, shown: &PlacedPrimitive<'_>) -> Result<(), Error> {
@@ -204,7 +210,13 @@ impl Points {
             match color {
                 Some(color) => {
                     let linear = scene.vectors(color, &[3, 4], Some(shown.count))?;
-                    colors.par_extend(linear.into_par_iter().map(srgb));
+                    // The format has colours of 0 to 1, but some programs write bytes without "normalized".
+                    let scale = ColorScale::of(linear.len(), true, |i| linear[i].map(f64::from));
+                    let full = scale.full() as f32;
+                    if full > 1.0 {
+                        self.full = Some(full);
+                    }
+                    colors.par_extend(linear.into_par_iter().map(|value| srgb(value.map(|channel| channel / full))));
                 }
                 None => colors.resize(colors.len() + shown.count, srgb([1.0; 3])),
             }

@@ -2,9 +2,9 @@
 //!
 //! # How it works
 //!
-//! A table behind the points states the length of each chunk. If there is no table, or it cannot be true, the chunks are
-//! found one after the other. A chunk in layers states its number of points and its length. Any other chunk has a fixed
-//! number of points, and ends where decompressing these ends.
+//! A table behind the points states the length of each chunk. If there is no table, or it cannot be true, the chunks
+//! are found one after the other. A chunk in layers states its number of points and its length. Any other chunk has a
+//! fixed number of points, and ends where decompressing these ends.
 
 use std::{io::Cursor, ops::Range};
 
@@ -12,10 +12,13 @@ use laz::{LazItem, LazItemType, LazVlr, laszip::ChunkTable};
 
 use super::super::Job;
 use super::{
+    decompressor::{decompressor, layered},
     header::Header,
-    laz::{MAX_RATIO, decompressor, layered},
     point14,
 };
+
+/// Most points per byte of the file. Real data need a byte or more per point, but a chunk of equal points far less.
+pub(super) const MAX_RATIO: usize = 1024;
 
 /// Points decompressed between two checks for cancellation.
 const CHECKED: usize = 1 << 16;

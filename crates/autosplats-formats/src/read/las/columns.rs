@@ -7,11 +7,11 @@
 //! no memory, and is finally left out as not recorded.
 //!
 //! Colours have 16 bits in the file, but many writers store 8-bit values. One byte is kept of each: the low byte until
-//! a value above 255 appears. All values before it are then known to be at most 255, so their high bytes are zero.
+//! more values exceed 255 than [`ColorScale`] would clip. High bytes of points before are zero, but for those listed.
 
 use std::{
     ops::Range,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::atomic::{AtomicUsize, Ordering},
 };
 
 use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, each_type, residual};
@@ -24,7 +24,10 @@ use super::{
     extra::Extra,
     header::{Header, bytes_at},
 };
-use crate::las::{self, ANGLE_STEP, Place};
+use crate::{
+    color_scale::{ColorScale, Levels},
+    las::{self, ANGLE_STEP, Place},
+};
 
 /// Points decoded between two checks for cancellation, and points of a preview chunk.
 pub(super) const BATCH: usize = 1 << 19;
@@ -41,6 +44,9 @@ pub(super) struct ValueFacts {
     colors: bool,
     /// Whether 8 bits lose some of a colour.
     lossy_colors: bool,
+    levels: Levels,
+    /// Points whose colours were read as 8 bits though they exceed them, and the high bytes of these colours.
+    bright: Vec<(usize, [u8; 3])>,
 }
 
 impl ValueFacts {
@@ -52,6 +58,8 @@ impl ValueFacts {
         self.residuals |= other.residuals;
         self.colors |= other.colors;
         self.lossy_colors |= other.lossy_colors;
+        self.levels = self.levels.and(other.levels);
+        self.bright.extend(&other.bright);
     }
 }
 
@@ -67,8 +75,8 @@ pub(super) struct Columns<'a> {
     residuals: Vec<[f32; 3]>,
     colors: Vec<[u8; 3]>,
     fields: Vec<FieldValues>,
-    /// Whether a colour above 255 has been found.
-    wide_colors: AtomicBool,
+    /// Number of colour values above 255 found so far.
+    above_byte: AtomicUsize,
     seen: ValueFacts,
 }
 
@@ -96,7 +104,7 @@ impl<'a> Columns<'a> {
             colors: zeroed(if colors_at.is_some() { count } else { 0 }, "colours")?,
             fields: dimensions.iter().map(|dimension| dimension.zeros(count)).collect::<Result<_, _>>()?,
             dimensions,
-            wide_colors: AtomicBool::new(false),
+            above_byte: AtomicUsize::new(0),
             seen: ValueFacts::default(),
         })
     }
@@ -109,7 +117,8 @@ impl<'a> Columns<'a> {
         counts: &[usize],
         work: impl Fn(usize, &mut Piece<'_>) -> Result<(), String> + Sync + Send,
     ) -> Vec<Result<(), String>> {
-        let were_wide = *self.wide_colors.get_mut();
+        let enough = self.enough();
+        let were_wide = *self.above_byte.get_mut() > enough;
         let mut positions = &mut self.positions[start..];
         let mut residuals = self.residuals.get_mut(start..).unwrap_or_default();
         let mut colors = self.colors.get_mut(start..).unwrap_or_default();
@@ -119,7 +128,9 @@ impl<'a> Columns<'a> {
             origin: self.origin,
             colors_at: self.colors_at,
             dimensions: &self.dimensions,
-            wide: &self.wide_colors,
+            above_byte: &self.above_byte,
+            enough,
+            start: 0,
             positions: split(&mut positions, count),
             residuals: split(&mut residuals, count),
             colors: split(&mut colors, count),
@@ -128,7 +139,12 @@ impl<'a> Columns<'a> {
             narrow: 0,
             done: 0,
         });
-        let pieces: Vec<Piece<'_>> = pieces.collect();
+        let mut pieces: Vec<Piece<'_>> = pieces.collect();
+        let mut at = start;
+        for (piece, &count) in pieces.iter_mut().zip(counts) {
+            piece.start = at;
+            at += count;
+        }
         let outcomes: Vec<_> = pieces
             .into_par_iter()
             .enumerate()
@@ -137,7 +153,7 @@ impl<'a> Columns<'a> {
                 (outcome, piece.seen, piece.narrow)
             })
             .collect();
-        let wide = *self.wide_colors.get_mut();
+        let wide = *self.above_byte.get_mut() > enough;
         if wide && !were_wide && !self.colors.is_empty() {
             clear(&mut self.colors[..start]);
         }
@@ -151,12 +167,39 @@ impl<'a> Columns<'a> {
             errors.push(outcome);
             at += count;
         }
+        if wide {
+            self.put_bright();
+        }
         errors
+    }
+
+    /// Number of values above 255 that are more than may be clipped, whatever colours follow.
+    fn enough(&self) -> usize {
+        Levels::most_clipped(3 * self.colors.len())
+    }
+
+    fn put_bright(&mut self) {
+        for (point, high) in self.seen.bright.drain(..) {
+            self.colors[point] = high;
+        }
+    }
+
+    /// Takes the high bytes of all colours, if after all points so many exceed 8 bits that 16 are meant.
+    fn settle_colors(&mut self) {
+        let enough = self.enough();
+        if self.seen.levels.are_wide() {
+            if *self.above_byte.get_mut() <= enough {
+                clear(&mut self.colors);
+                *self.above_byte.get_mut() = enough + 1;
+            }
+            self.put_bright();
+        }
     }
 
     /// Removes ranges of points, which must be in order. Kept points move down, and no mask is allocated: a small file
     /// may claim millions of points that cannot be decompressed, whose memory is untouched.
     pub(super) fn remove(&mut self, ranges: &[Range<usize>]) {
+        self.settle_colors();
         remove(&mut self.positions, ranges);
         remove(&mut self.residuals, ranges);
         remove(&mut self.colors, ranges);
@@ -206,10 +249,15 @@ impl<'a> Columns<'a> {
     }
 
     /// Makes the cloud; a field that is zero at every point was not recorded and is left out. The second result tells
-    /// whether the 16-bit colours hold 8-bit values.
-    pub(super) fn into_cloud(mut self) -> Result<(PointCloud, bool), Error> {
+    /// that the 16-bit colours are read as 8 bits.
+    pub(super) fn into_cloud(mut self) -> Result<(PointCloud, Option<String>), Error> {
+        self.settle_colors();
         let mut names = self.names().into_iter().peekable();
-        let narrow = self.seen.colors && !*self.wide_colors.get_mut();
+        let narrow = self.seen.colors && !self.seen.levels.are_wide();
+        let told = narrow.then(|| {
+            let all = || "no colour value exceeds 255; the 16-bit colours are read as 8 bits".to_owned();
+            ColorScale::of_levels(self.seen.levels, false).note().unwrap_or_else(all)
+        });
         let mut cloud = PointCloud::new(self.origin, self.positions).with_axes(Axes::ZUp);
         if self.seen.residuals {
             cloud = cloud.with_residuals(self.residuals)?;
@@ -222,7 +270,7 @@ impl<'a> Columns<'a> {
                 cloud = cloud.with_field(name, values)?;
             }
         }
-        Ok((cloud, narrow))
+        Ok((cloud, told))
     }
 }
 
@@ -232,7 +280,10 @@ pub(super) struct Piece<'a> {
     origin: DVec3,
     colors_at: Option<usize>,
     dimensions: &'a [Dimension],
-    wide: &'a AtomicBool,
+    above_byte: &'a AtomicUsize,
+    enough: usize,
+    /// Index of the first point.
+    start: usize,
     positions: &'a mut [[f32; 3]],
     residuals: &'a mut [[f32; 3]],
     colors: &'a mut [[u8; 3]],
@@ -277,27 +328,34 @@ impl Piece<'_> {
 
     fn take_colors<'r>(&mut self, range: Range<usize>, at: usize, records: impl Iterator<Item = &'r [u8]> + Clone) {
         let colors = records.map(|record| [u16_at(record, at), u16_at(record, at + 2), u16_at(record, at + 4)]);
-        let mut bits = 0;
+        let (mut positive, mut above) = (0, 0);
         let mut lossy = false;
         for channel in colors.clone().flatten() {
-            bits |= channel;
+            positive += u32::from(channel > 0);
+            above += u32::from(channel > 255);
             lossy |= channel != (channel >> 8) * 257;
         }
-        if bits == 0 {
+        if positive == 0 {
             return;
         }
         self.seen.colors = true;
         self.seen.lossy_colors |= lossy;
-        if bits > 255 {
-            self.wide.store(true, Ordering::Relaxed);
+        self.seen.levels = self.seen.levels.and(Levels::whole(positive as usize, above as usize));
+        let before = self.above_byte.fetch_add(above as usize, Ordering::Relaxed);
+        let first = self.start + range.start;
+        if before + above as usize > self.enough {
+            for (color, channels) in self.colors[range].iter_mut().zip(colors) {
+                *color = channels.map(|channel| (channel >> 8) as u8);
+            }
+            return;
         }
-        let wide = self.wide.load(Ordering::Relaxed);
-        if !wide {
-            self.narrow = range.end;
+        self.narrow = range.end;
+        for (color, channels) in self.colors[range].iter_mut().zip(colors.clone()) {
+            *color = channels.map(|channel| channel.min(255) as u8);
         }
-        let shift = if wide { 8 } else { 0 };
-        for (color, channels) in self.colors[range].iter_mut().zip(colors) {
-            *color = channels.map(|channel| (channel >> shift) as u8);
+        if above > 0 {
+            let high = colors.map(|channels| channels.map(|channel| (channel >> 8) as u8)).enumerate();
+            self.seen.bright.extend(high.filter(|(_, high)| *high != [0; 3]).map(|(i, high)| (first + i, high)));
         }
     }
 }

@@ -13,18 +13,14 @@ use std::{
 };
 
 use autosplats_cloud::{Error, guard};
-use laz::{
-    LazItem, LazItemType, LazVlr,
-    record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor},
-};
+use laz::{LazItem, LazItemType, LazVlr, record::RecordDecompressor};
 
 use super::super::Job;
 use super::{
-    chunks::{Chunk, Chunks},
+    chunks::{Chunk, Chunks, MAX_RATIO},
     columns::{BATCH, Columns, preview},
-    gps_time::GpsTime11,
+    decompressor::{DynDecompressor, decompressor, layered},
     header::Header,
-    point14::Point14,
     records::Records,
 };
 
@@ -33,9 +29,6 @@ const PIECE: usize = 1 << 11;
 
 /// Most chunks decompressed in parallel; many very short chunks would need much memory for bookkeeping.
 const MAX_CHUNKS: usize = 1 << 10;
-
-/// Most points per byte of the file. Real data need a byte or more per point, but a chunk of equal points far less.
-pub(super) const MAX_RATIO: usize = 1024;
 
 /// The compressed points of a file.
 pub(super) struct Compressed<'a> {
@@ -265,11 +258,6 @@ fn compression(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Result<
     }
 }
 
-/// Whether chunks store each kind of value apart, as those of point formats 6 and up do.
-pub(super) fn layered(items: &[LazItem]) -> bool {
-    items.first().is_some_and(|item| item.version() >= 3)
-}
-
 /// Checks that the compressed items form a complete record of the point format, in the right order.
 fn check_items(items: &[LazItem], header: &Header) -> Result<(), String> {
     let wide = header.format >= 6;
@@ -289,34 +277,6 @@ fn check_items(items: &[LazItem], header: &Header) -> Result<(), String> {
     } else {
         Err(format!("the compression record does not fit records of format {}", header.format))
     }
-}
-
-type DynDecompressor<'a> = dyn RecordDecompressor<Cursor<&'a [u8]>> + Send + Sync + 'a;
-pub(super) type Decompressor<'a> = Box<DynDecompressor<'a>>;
-
-/// Makes a decompressor. Items on which damage would overflow the crate's stack are decoded by this project's code.
-pub(super) fn decompressor<'a>(items: &[LazItem], chunk: &'a [u8]) -> Result<Decompressor<'a>, String> {
-    let theirs = |decompressor: &mut dyn RecordDecompressor<Cursor<&'a [u8]>>, item: LazItem| {
-        decompressor.set_fields_from(&vec![item]).map_err(|error| error.to_string())
-    };
-    if layered(items) {
-        let mut decompressor = LayeredPointRecordDecompressor::new(Cursor::new(chunk));
-        for &item in items {
-            match (item.item_type(), item.version()) {
-                (LazItemType::Point14, version @ 3..=4) => decompressor.add_field_decompressor(Point14::new(version)),
-                _ => theirs(&mut decompressor, item)?,
-            }
-        }
-        return Ok(Box::new(decompressor));
-    }
-    let mut decompressor = SequentialPointRecordDecompressor::new(Cursor::new(chunk));
-    for &item in items {
-        match (item.item_type(), item.version()) {
-            (LazItemType::GpsTime, 2) => decompressor.add_field_decompressor(GpsTime11::default()),
-            _ => theirs(&mut decompressor, item)?,
-        }
-    }
-    Ok(Box::new(decompressor))
 }
 
 /// Decompresses the next records. An error holds the number of complete records before it.

@@ -12,6 +12,7 @@
 mod chunks;
 mod columns;
 mod coordinates;
+mod decompressor;
 mod describe;
 mod dimension;
 mod extra;
@@ -90,9 +91,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
 
     columns.remove(&damaged);
     let (cloud, narrow) = columns.into_cloud()?;
-    if narrow {
-        notes.push("no colour value exceeds 255; the 16-bit colours are read as 8 bits".into());
-    }
+    notes.extend(narrow);
     let claimed = header.points;
     if more {
         notes.push(format!("the header states {claimed} points, but the compressed data hold more; they are left out"));

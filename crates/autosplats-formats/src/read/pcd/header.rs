@@ -6,7 +6,7 @@ use glam::{DMat4, DQuat, DVec3, DVec4};
 use super::super::{
     Job, MAX_HEADER_LINE,
     table::Scalar,
-    text::{after_line_end, line_end},
+    text::{self, after_line_end, line_end},
 };
 
 /// Encoding of the values after the header.
@@ -76,6 +76,8 @@ pub(super) struct Header {
     pub(super) axes: Option<Axes>,
     /// Whether an identity viewpoint is the sensor's true pose; files of this project state it in a comment.
     pub(super) knows_sensor: bool,
+    /// Place and words of the first thing in the header that the format does not know.
+    odd: Option<(String, String)>,
     /// First byte after the header.
     pub(super) end: usize,
 }
@@ -93,7 +95,8 @@ impl Header {
         let (mut names, mut sizes, mut types, mut counts) = (None, None, None, None);
         let (mut width, mut height, mut points) = (None, None, None);
         let mut viewpoint = Viewpoint::Identity;
-        let (mut axes, mut knows_sensor) = (None, false);
+        let (mut axes, mut knows_sensor, mut odd) = (None, false, None);
+        let mut seen = false;
         let (mut at, mut line) = (0, 0);
         let (encoding, line) = loop {
             line += 1;
@@ -109,6 +112,8 @@ impl Header {
             let words = words(&job.bytes[at..end]);
             at = after_line_end(job.bytes, at);
             let Some((keyword, values)) = words.split_first() else { continue };
+            let begun = seen;
+            seen |= !keyword.starts_with('#');
             let number = || {
                 let value = values.first().map_or("", String::as_str);
                 value
@@ -134,10 +139,14 @@ impl Header {
                     }
                 },
                 "#" if values.first().is_some_and(|word| word == "axes") => {
-                    axes = values.get(1).and_then(|word| axes_of(word)).or(axes);
+                    axes = values.get(1).and_then(|word| Axes::from_name(word)).or(axes);
                 }
                 "#" if values == ["sensor", "at", "VIEWPOINT"] => knows_sensor = true,
                 word if word.starts_with('#') => {}
+                word if begun && word.starts_with(char::is_alphabetic) => {
+                    let what = || format!("'{}' is not a PCD header keyword; skipped", excerpt(keyword.as_bytes()));
+                    odd.get_or_insert_with(|| (place.clone(), what()));
+                }
                 word => {
                     let word = excerpt(word.as_bytes());
                     let what = format!("'{word}' is not a PCD header keyword; if the file is plain text, name it .xyz");
@@ -146,8 +155,16 @@ impl Header {
             }
         };
         let fail = |what: String| job.malformed(line.clone(), what);
-        let (Some(names), Some(sizes), Some(types)) = (names, sizes, types) else {
-            return Err(fail("the header lacks FIELDS, SIZE or TYPE".into()));
+        let Some(names) = names else { return Err(fail("the header lacks FIELDS".into())) };
+        let (sizes, types) = match (sizes, types) {
+            (Some(sizes), Some(types)) => (sizes, types),
+            (None, None) => {
+                // Files of version 0.5 hold floats.
+                let what = "SIZE and TYPE are missing, as in version 0.5; taken for 32-bit floats";
+                odd.get_or_insert_with(|| (line.clone(), what.to_owned()));
+                (vec!["4".to_owned(); names.len()], vec!["F".to_owned(); names.len()])
+            }
+            _ => return Err(fail("the header lacks SIZE or TYPE".into())),
         };
         let counts = counts.unwrap_or_else(|| vec!["1".into(); names.len()]);
         if [sizes.len(), types.len(), counts.len()] != [names.len(); 3] {
@@ -167,7 +184,23 @@ impl Header {
         let points = points
             .or_else(|| width?.checked_mul(height))
             .ok_or_else(|| fail("the header lacks POINTS, or WIDTH and HEIGHT".into()))?;
-        Ok(Self { fields, width, height, points, encoding, viewpoint, axes, knows_sensor, end: at })
+        let end = after_extension(job.bytes, at, encoding == Encoding::Ascii);
+        if end > at {
+            odd.get_or_insert_with(|| (line, "lines between the header and the points are skipped".into()));
+        }
+        Ok(Self { fields, width, height, points, encoding, viewpoint, axes, knows_sensor, odd, end })
+    }
+
+    /// Tells what the header has that the format does not know. What is skipped may be a misspelt keyword, so a binary
+    /// file has to be as long as the rest says.
+    pub(super) fn tell_odd(&self, job: &Job<'_>) -> Result<(), Error> {
+        let Some((place, what)) = &self.odd else { return Ok(()) };
+        let len = self.stride().and_then(|stride| stride.checked_mul(self.points)?.checked_add(self.end));
+        if self.encoding == Encoding::Binary && len != Some(job.bytes.len()) {
+            return Err(job.malformed(place, format!("{what}; the file is not as long as its header then says")));
+        }
+        job.note(format!("{place}: {what}"));
+        Ok(())
     }
 
     /// Bytes of a point.
@@ -178,13 +211,28 @@ impl Header {
     }
 }
 
-fn axes_of(word: &str) -> Option<Axes> {
-    Some(match word {
-        "z-up" => Axes::ZUp,
-        "y-up" => Axes::YUp,
-        "camera" => Axes::Camera,
-        _ => return None,
-    })
+/// The first byte after lines that some programs put between header and points: a block between HEADER_EXT_START and
+/// HEADER_EXT_END, or in text any lines that begin with a word.
+fn after_extension(bytes: &[u8], start: usize, text: bool) -> usize {
+    let mut at = start;
+    let mut inside = false;
+    while at < bytes.len() {
+        let line = bytes[at..line_end(bytes, at)].trim_ascii();
+        inside |= line.starts_with(b"HEADER_EXT_START");
+        let word = text && line.first().is_some_and(u8::is_ascii_alphabetic) && !starts_with_number(line);
+        if !inside && !word {
+            break;
+        }
+        at = after_line_end(bytes, at);
+        inside &= !line.starts_with(b"HEADER_EXT_END");
+    }
+    // A block without an end is none.
+    if inside { start } else { at }
+}
+
+/// Whether a line begins with `nan` or `inf`.
+fn starts_with_number(line: &[u8]) -> bool {
+    text::values(line).next().is_some_and(|value| text::number(value).is_ok())
 }
 
 fn scalar_of(kind: &str, size: &str) -> Option<Scalar> {

@@ -10,8 +10,8 @@ use self::header::{Encoding, Header, Viewpoint};
 use super::{
     Attribute, Description, Format, Job,
     body::Body,
-    columns::{MAX_COUNT, numbered},
-    table::{Column, ProgressRange, Scalar, Table, reserve},
+    columns::{MAX_COUNT, numbered, unrepeated},
+    table::{Column, ProgressRange, Table, reserve},
     text::{Rows, TEXT, Token, is_coordinate},
     xyz,
 };
@@ -51,7 +51,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
     Ok(Description {
         format: format!("PCD, {}", header.encoding.name()),
         points: Some(header.points as u64),
-        attributes: fields.map(|field| Attribute::new(excerpt(field.name.as_bytes()), stored(field))).collect(),
+        attributes: unrepeated(fields.map(|field| Attribute::new(excerpt(field.name.as_bytes()), stored(field)))),
         scans: scans(&header, header.points),
         details,
         ..Description::default()
@@ -84,6 +84,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         return (xyz::FORMAT.read)(job);
     }
     let header = Header::parse(job)?;
+    header.tell_odd(job)?;
     let long = |field: &&header::Field| field.name != "_" && field.count > MAX_COUNT;
     for field in header.fields.iter().filter(long).take(MAX_NOTED_FIELDS) {
         let name = excerpt(field.name.as_bytes());
@@ -95,14 +96,9 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         Encoding::Binary => {
             job.check_not_text_converted(header.end)?;
             let bytes = &job.bytes[header.end..];
-            if header.points.checked_mul(stride).is_none_or(|needed| needed > bytes.len()) {
-                let complete = bytes.len() / stride.max(1);
-                return Err(job.malformed(
-                    format!("byte {}", job.bytes.len()),
-                    format!("the file ends after {complete} of {} points; it is cut off, copy it again", header.points),
-                ));
-            }
-            let table = table(&header, bytes, 0.0, |before, _| (before, stride));
+            let held = header.points.min(bytes.len() / stride.max(1));
+            job.tell_cut_off(held, header.points, "points")?;
+            let table = Table { count: held, ..table(&header, bytes, 0.0, |before, _| (before, stride)) };
             table.preview(job, "header")?;
             table.into_cloud(job, "header")?
         }
@@ -197,11 +193,7 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
             tokens.extend(std::iter::repeat_n(Token::Skip, field.count));
             continue;
         }
-        let (scalar, token) = match &*field.name.to_ascii_lowercase() {
-            name if is_coordinate(name) => (Scalar::F64, Token::Store(Scalar::F64)),
-            "rgb" | "rgba" if field.scalar.size() == 4 => (Scalar::U32, Token::Packed),
-            _ => (field.scalar, Token::Store(field.scalar)),
-        };
+        let (scalar, token) = Token::of(&field.name, field.scalar);
         for name in names {
             columns.push(Column { name, scalar, offset, stride: 0 });
             tokens.push(token);
@@ -211,7 +203,7 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
     for column in &mut columns {
         column.stride = offset;
     }
-    let rows = Rows { tokens: &tokens, count: Some(header.points), counts_between: false };
+    let rows = Rows { tokens: &tokens, count: Some(header.points), may_be_cut: true };
     let done = PARSING.len;
     let (bytes, count) = rows.parse_and_show(job, header.end, PARSING, |bytes, count| {
         Table { bytes, count, big_endian: false, columns: columns.clone(), packed_rgb: true, done }

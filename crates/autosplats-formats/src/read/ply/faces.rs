@@ -61,12 +61,11 @@ impl Reader<'_> {
         if self.strips { faces.strip(corners.iter().copied()) } else { faces.polygon(corners) }
     }
 
-    /// Error if the file ends in a face; `complete` is the number of complete faces.
-    fn cut_off(&self, complete: usize) -> Error {
-        self.job.malformed(
-            format!("byte {}", self.job.bytes.len()),
-            format!("the file ends after {complete} of {} faces; it is cut off, copy it again", self.element.count),
-        )
+    /// Tells that the file ends in a face; `complete` is the number of complete faces.
+    fn tell_cut_off(&self, complete: usize) {
+        let count = self.element.count;
+        let lost = count - complete;
+        self.job.note(format!("the file is cut off: {lost} of {count} faces are lost; copy it again"));
     }
 
     fn binary(&self, start: usize, big_endian: bool, faces: &mut Faces) -> Result<(), Error> {
@@ -86,7 +85,10 @@ impl Reader<'_> {
                     continue;
                 };
                 let raw = bytes.get(at..).and_then(|rest| rest.get(..count.size()));
-                let raw = raw.ok_or_else(|| self.cut_off(face))?;
+                let Some(raw) = raw else {
+                    self.tell_cut_off(face);
+                    return Ok(());
+                };
                 let Some(len) = list_len(raw, big_endian, count) else {
                     return Err(self
                         .job
@@ -94,7 +96,10 @@ impl Reader<'_> {
                 };
                 at += count.size();
                 let end = len.checked_mul(size).and_then(|len| at.checked_add(len)).filter(|&end| end <= bytes.len());
-                let end = end.ok_or_else(|| self.cut_off(face))?;
+                let Some(end) = end else {
+                    self.tell_cut_off(face);
+                    return Ok(());
+                };
                 if index == self.list {
                     let corner = |raw| corner(raw, big_endian, property.scalar);
                     corners.clear();
@@ -108,7 +113,8 @@ impl Reader<'_> {
                 at = end;
             }
             if at > bytes.len() {
-                return Err(self.cut_off(face));
+                self.tell_cut_off(face);
+                return Ok(());
             }
         }
         Ok(())
@@ -116,9 +122,16 @@ impl Reader<'_> {
 
     fn ascii(&self, start: usize, faces: &mut Faces) -> Result<(), Error> {
         let job = self.job;
-        let Some(end) = lines::skip_lines(job, start, self.element.count)? else {
-            let complete = lines::lines(job.bytes, &(start..job.bytes.len())).count();
-            return Err(self.cut_off(complete.min(self.element.count.saturating_sub(1))));
+        let end = lines::skip_lines(job, start, self.element.count)?;
+        let last = job.bytes.iter().rposition(|&byte| byte == b'\n').map_or(start, |at| start.max(at + 1));
+        let unfinished = || self.row(&job.bytes[last..], &mut Vec::new()).is_err();
+        let end = match end {
+            Some(end) if end < job.bytes.len() || last == end || !unfinished() => end,
+            _ => {
+                // Digits of an unfinished last line may be missing.
+                self.tell_cut_off(lines::lines(job.bytes, &(start..last)).count());
+                last
+            }
         };
         job.check_memory(self.element.count, 12)?;
         let points = faces.points();

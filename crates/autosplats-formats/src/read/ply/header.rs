@@ -54,6 +54,8 @@ pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
     pub(super) axes: Option<Axes>,
+    /// Number and first word of the first line that begins with an unknown word.
+    pub(super) unknown: Option<(usize, String)>,
     /// First byte after the header.
     pub(super) end: usize,
 }
@@ -66,7 +68,7 @@ impl Header {
         }
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
-        let mut axes = None;
+        let (mut axes, mut unknown) = (None, None);
         let mut start = 0;
         for number in 1.. {
             let fail = |what: String| job.malformed(format!("line {number}"), what);
@@ -91,7 +93,7 @@ impl Header {
                 None | Some("obj_info") => {}
                 Some("comment") => {
                     if words.next() == Some("axes") {
-                        axes = words.next().and_then(axes_of).or(axes);
+                        axes = words.next().and_then(Axes::from_name).or(axes);
                     }
                 }
                 Some("format") => {
@@ -121,12 +123,12 @@ impl Header {
                 }
                 Some("end_header") => break,
                 Some(other) => {
-                    return Err(fail(format!("unknown word '{}' in the header", excerpt(other.as_bytes()))));
+                    unknown.get_or_insert_with(|| (number, excerpt(other.as_bytes())));
                 }
             }
         }
         let encoding = encoding.ok_or_else(|| job.malformed("header", "no line 'format'"))?;
-        Ok(Self { encoding, elements, axes, end: start })
+        Ok(Self { encoding, elements, axes, unknown, end: start })
     }
 }
 
@@ -176,13 +178,4 @@ fn scalar_of(word: &str) -> Option<Scalar> {
         "double" | "float64" => Scalar::F64,
         _ => return None,
     })
-}
-
-fn axes_of(word: &str) -> Option<Axes> {
-    match word {
-        "z-up" => Some(Axes::ZUp),
-        "y-up" => Some(Axes::YUp),
-        "camera" => Some(Axes::Camera),
-        _ => None,
-    }
 }

@@ -42,6 +42,17 @@ pub(in super::super) fn body(job: &Job<'_>) -> Result<(Body, usize, Option<usize
     Ok((body, end, least))
 }
 
+/// Whether a binary file is exactly as long as its header and lists say.
+pub(super) fn fits(job: &Job<'_>) -> Result<bool, Error> {
+    let len = job.bytes.len();
+    let (body, mut at, _) = body(job)?;
+    Ok(match body {
+        Body::Bytes(body) => at.checked_add(body) == Some(len),
+        Body::Records(mut records) => records.end(job.bytes, &mut at) == Ok(Some(len)),
+        Body::Lines(_) | Body::Sized => true,
+    })
+}
+
 impl Records for ListRecords {
     fn end(&mut self, bytes: &[u8], at: &mut usize) -> Result<Option<usize>, String> {
         while let Some(element) = self.elements.get(self.element) {

@@ -11,11 +11,12 @@ use autosplats_cloud::{Contents, Error, PointCloud, excerpt};
 pub(super) use self::length::body;
 use self::{
     header::{Element, Encoding, Header},
-    walk::{skip, skip_rows, walk},
+    walk::{Walked, skip, skip_rows, walk},
 };
 use super::{
     Attribute, Description, Format, Job,
-    table::{Column, ProgressRange, Scalar, Table, reserve},
+    columns::unrepeated,
+    table::{Column, ProgressRange, Table, reserve},
     text::{Rows, TEXT, Token, is_coordinate},
 };
 
@@ -56,7 +57,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
         format: format!("PLY, {}", header.encoding.name()),
         points: Some(vertex.count as u64),
         faces: count("face").or_else(in_strips).map(|faces| faces as u64),
-        attributes: vertex.properties.iter().map(|p| Attribute::new(excerpt(p.name.as_bytes()), stored(p))).collect(),
+        attributes: unrepeated(vertex.properties.iter().map(|p| Attribute::new(excerpt(p.name.as_bytes()), stored(p)))),
         details: others.map(|e| (format!("element {}", excerpt(e.name.as_bytes())), e.count.to_string())).collect(),
         ..Description::default()
     })
@@ -77,6 +78,10 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let header = Header::parse(job)?;
     let index = vertices(job, &header)?;
     let (before, vertex) = (&header.elements[..index], &header.elements[index]);
+    check_unknown_lines(job, &header)?;
+    if vertex.properties.iter().any(|property| property.name == "packed_position") {
+        return Err(job.unsupported("compressed 3D Gaussian splats; export them as an uncompressed PLY"));
+    }
     if header.encoding != Encoding::Ascii {
         job.check_not_text_converted(header.end)?;
     }
@@ -89,8 +94,20 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         Some(axes) => cloud.with_axes(axes),
         None => cloud,
     };
-    let triangles = if job.triangles { faces::triangles(job, &header, cloud.len())? } else { Vec::new() };
+    let whole = cloud.len() == vertex.count;
+    let triangles = if job.triangles && whole { faces::triangles(job, &header, cloud.len())? } else { Vec::new() };
     Ok(Contents { cloud, triangles })
+}
+
+/// Tells which lines of the header are skipped. Such a line may be a misspelt property, so a binary file has to be as
+/// long as the others say.
+fn check_unknown_lines(job: &Job<'_>, header: &Header) -> Result<(), Error> {
+    let Some((line, word)) = &header.unknown else { return Ok(()) };
+    if header.encoding != Encoding::Ascii && !length::fits(job)? {
+        return Err(job.malformed(format!("line {line}"), format!("unknown word '{word}' in the header")));
+    }
+    job.note(format!("line {line} of the header begins with the unknown word '{word}'; such lines are skipped"));
+    Ok(())
 }
 
 fn ascii(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<PointCloud, Error> {
@@ -103,12 +120,12 @@ fn ascii(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -
             tokens.push(Token::SkipList);
             continue;
         }
-        let scalar = if is_coordinate(&property.name) { Scalar::F64 } else { property.scalar };
+        let (scalar, token) = Token::of(&property.name, property.scalar);
         columns.push(Column { name: property.name.clone(), scalar, offset, stride: 0 });
-        tokens.push(Token::Store(scalar));
-        offset += scalar.size();
+        tokens.push(token);
+        offset += token.size();
     }
-    let rows = Rows { tokens: &tokens, count: Some(vertex.count), counts_between: false };
+    let rows = Rows { tokens: &tokens, count: Some(vertex.count), may_be_cut: true };
     let (records, count) = rows.parse_and_show(job, start, PACKING, |records, count| {
         packed_table(records, count, false, columns.clone(), offset).preview(job, "header")
     })?;
@@ -125,13 +142,8 @@ fn plain(
 ) -> Result<PointCloud, Error> {
     let start = skip(job, header, before, vertex)?;
     let bytes = &job.bytes[start..];
-    if vertex.count.checked_mul(stride).is_none_or(|needed| needed > bytes.len()) {
-        let complete = bytes.len() / stride.max(1);
-        return Err(job.malformed(
-            format!("byte {}", job.bytes.len()),
-            format!("the file ends after {complete} of {} points; it is cut off, copy it again", vertex.count),
-        ));
-    }
+    let count = vertex.count.min(bytes.len() / stride.max(1));
+    job.tell_cut_off(count, vertex.count, "points")?;
     let mut offset = 0;
     let columns = vertex.properties.iter().map(|property| {
         offset += property.scalar.size();
@@ -139,7 +151,7 @@ fn plain(
     });
     let columns = columns.collect();
     let big_endian = header.encoding == Encoding::Big;
-    let table = Table { bytes, count: vertex.count, big_endian, columns, packed_rgb: false, done: 0.0 };
+    let table = Table { bytes, count, big_endian, columns, packed_rgb: true, done: 0.0 };
     table.preview(job, "header")?;
     table.into_cloud(job, "header")
 }
@@ -154,13 +166,14 @@ fn with_lists(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Eleme
         stride += property.scalar.size();
     }
     let mut records = Vec::new();
-    walk(job, header, vertex, start, PACKING, |bytes| {
+    let Walked { count, .. } = walk(job, header, vertex, start, PACKING, |bytes| {
         reserve(&mut records, bytes.len(), "points with lists")?;
         records.extend_from_slice(bytes);
         Ok(())
     })?;
+    job.tell_cut_off(count, vertex.count, "points")?;
     let big_endian = header.encoding == Encoding::Big;
-    let table = packed_table(&records, vertex.count, big_endian, columns, stride);
+    let table = packed_table(&records, count, big_endian, columns, stride);
     table.preview(job, "header")?;
     table.into_cloud(job, "header")
 }
@@ -169,5 +182,5 @@ fn packed_table(bytes: &[u8], count: usize, big_endian: bool, mut columns: Vec<C
     for column in &mut columns {
         column.stride = stride;
     }
-    Table { bytes, count, big_endian, columns, packed_rgb: false, done: PACKING.start + PACKING.len }
+    Table { bytes, count, big_endian, columns, packed_rgb: true, done: PACKING.start + PACKING.len }
 }

@@ -22,7 +22,10 @@ pub(super) fn skip(job: &Job<'_>, header: &Header, before: &[Element], wanted: &
     for element in before {
         at = match element.stride() {
             Some(stride) => element.count.checked_mul(stride).and_then(|len| at.checked_add(len)),
-            None => Some(walk(job, header, element, at, ProgressRange { start: 0.0, len: 0.0 }, |_| Ok(()))?),
+            None => {
+                let walked = walk(job, header, element, at, ProgressRange { start: 0.0, len: 0.0 }, |_| Ok(()))?;
+                (walked.count == element.count).then_some(walked.end)
+            }
         }
         .filter(|&end| end <= job.bytes.len())
         .ok_or_else(|| cut_off(job, wanted))?;
@@ -30,8 +33,14 @@ pub(super) fn skip(job: &Job<'_>, header: &Header, before: &[Element], wanted: &
     Ok(at)
 }
 
-/// Walks through the records of an element with lists. `keep` receives the bytes of each value that is no list. Returns
-/// the first byte after the element.
+/// Where a walk ended: after `count` complete records, at byte `end`.
+pub(super) struct Walked {
+    pub(super) count: usize,
+    pub(super) end: usize,
+}
+
+/// Walks through the records of an element with lists, as far as the file holds them. `keep` receives the bytes of each
+/// value that is no list, also in a record that is incomplete.
 pub(super) fn walk(
     job: &Job<'_>,
     header: &Header,
@@ -39,7 +48,7 @@ pub(super) fn walk(
     start: usize,
     part: ProgressRange,
     mut keep: impl FnMut(&[u8]) -> Result<(), Error>,
-) -> Result<usize, Error> {
+) -> Result<Walked, Error> {
     let mut at = start;
     for record in 0..element.count {
         if record % (1 << 14) == 0 {
@@ -49,26 +58,27 @@ pub(super) fn walk(
             let name = excerpt(element.name.as_bytes());
             job.malformed(format!("byte {at}"), format!("{what} in {name} {} of {}", record + 1, element.count))
         };
-        let cut = || fail("cut off or damaged, copy the file again: the file ends");
+        let cut = Ok(Walked { count: record, end: at });
         let mut next = at;
         for property in &element.properties {
             let size = property.scalar.size();
             let Some(count) = property.list else {
-                keep(job.bytes.get(next..next + size).ok_or_else(cut)?)?;
+                let Some(value) = job.bytes.get(next..next + size) else { return cut };
+                keep(value)?;
                 next += size;
                 continue;
             };
-            let raw = job.bytes.get(next..next + count.size()).ok_or_else(cut)?;
+            let Some(raw) = job.bytes.get(next..next + count.size()) else { return cut };
             let len = list_len(raw, header.encoding == Encoding::Big, count).ok_or_else(|| fail("a negative count"))?;
-            next = len
-                .checked_mul(size)
-                .and_then(|len| (next + count.size()).checked_add(len))
-                .filter(|&end| end <= job.bytes.len())
-                .ok_or_else(cut)?;
+            let end = len.checked_mul(size).and_then(|len| (next + count.size()).checked_add(len));
+            match end.filter(|&end| end <= job.bytes.len()) {
+                Some(end) => next = end,
+                None => return cut,
+            }
         }
         at = next;
     }
-    Ok(at)
+    Ok(Walked { count: element.count, end: at })
 }
 
 pub(super) fn list_len(raw: &[u8], big_endian: bool, scalar: Scalar) -> Option<usize> {

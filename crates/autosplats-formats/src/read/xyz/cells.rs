@@ -1,6 +1,7 @@
-//! The values of a line: separators and number formats.
+//! The values of a line, and the separators between them.
 
-use super::super::text;
+use super::super::{columns::MAX_COLUMNS, text};
+use super::numbers::{Notation, unquoted};
 
 /// Separator between values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,60 +39,58 @@ impl Separator {
     }
 }
 
-/// Notation of the rows.
+/// How rows are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Dialect {
     pub(super) separator: Separator,
-    pub(super) decimal_comma: bool,
+    pub(super) notation: Notation,
 }
 
 impl Dialect {
-    pub(super) const ANY: Self = Self { separator: Separator::Any, decimal_comma: false };
-    /// Notation for testing numbers that may have decimal commas.
-    pub(super) const COMMAS: Self = Self { separator: Separator::Blank, decimal_comma: true };
-
     pub(super) fn cells<'a>(&self, line: &'a [u8]) -> Cells<'a> {
         Cells { separator: self.separator, rest: Some(line) }
     }
 
-    /// Parses the number in a cell, which may have quotes and a decimal comma.
+    /// Parses the number in a cell.
     #[inline]
     pub(super) fn number(&self, cell: &[u8]) -> Result<f64, String> {
-        match fast_float2::parse(cell) {
-            Ok(number) => Ok(number),
-            Err(_) => self.odd_number(cell),
-        }
+        self.notation.number(cell)
     }
 
-    #[cold]
-    fn odd_number(&self, cell: &[u8]) -> Result<f64, String> {
-        let cell = unquoted(cell);
-        let mut points = [0; 64];
-        match points.get_mut(..cell.len()) {
-            Some(points) if self.decimal_comma => {
-                points.copy_from_slice(cell);
-                points.iter_mut().filter(|byte| **byte == b',').for_each(|byte| *byte = b'.');
-                text::number(points).map_err(|_| text::number(cell).err().unwrap_or_default())
-            }
-            _ => text::number(cell),
-        }
+    /// Number of values on a line, and the same without an empty value at the end. At most one more than allowed is
+    /// counted.
+    pub(super) fn count(&self, line: &[u8]) -> (usize, usize) {
+        let mut last = &b" "[..];
+        let count = self.cells(line).take(MAX_COLUMNS + 1).inspect(|cell| last = cell).count();
+        (count, count - usize::from(last.is_empty()))
     }
 }
 
-/// A cell without the blanks and quotes around it.
-pub(super) fn unquoted(cell: &[u8]) -> &[u8] {
-    let cell = cell.trim_ascii();
-    match cell {
-        [b'"', inner @ .., b'"'] => inner.trim_ascii(),
-        _ => cell,
-    }
-}
+/// Placeholders that databases, spreadsheets and people write for missing values, separated by semicolons.
+const MISSING: &str = "na;n/a;n.a.;null;(null);<null>;\\n;none;nil;nodata;no data;no_data;no-data;empty;missing;undefined;\
+    #n/a;#na;#nv;#null!;#value!;#wert!;#num!;#div/0!";
 
 /// Whether a cell is empty or holds a placeholder for a missing value.
 pub(super) fn is_missing(cell: &[u8]) -> bool {
     let cell = unquoted(cell);
-    matches!(cell, b"" | b"-")
-        || [&b"na"[..], b"n/a", b"null", b"none"].iter().any(|word| cell.eq_ignore_ascii_case(word))
+    cell.iter().all(|byte| matches!(byte, b'-' | b'?' | b'*'))
+        || MISSING.split(';').any(|word| cell.eq_ignore_ascii_case(word.as_bytes()))
+}
+
+/// Whether a line is a comment, or empty but for blanks.
+pub(super) fn is_comment(line: &[u8]) -> bool {
+    let start = text::trim(line);
+    if !text::is_blank(start) {
+        return false;
+    }
+    // Spreadsheets write #N/A for what is missing.
+    let first = start.split(|byte| matches!(byte, b',' | b';' | b'\t' | b' ')).next().unwrap_or_default();
+    first.is_empty() || !is_missing(first)
+}
+
+/// Whether a line is a count of points. Tabs separate an empty value.
+pub(super) fn is_count(line: &[u8]) -> bool {
+    !line.contains(&b'\t') && text::is_count(text::trim(line))
 }
 
 /// The cells of a line.
@@ -122,7 +121,8 @@ impl<'a> Iterator for Cells<'a> {
             Separator::Blank => run(|&byte| matches!(byte, b' ' | b'\t' | b'\r')),
             Separator::Comma | Separator::Semicolon | Separator::Tab => {
                 let byte = self.separator.byte()?;
-                let end = rest.iter().position(|&other| other == byte);
+                let start = if let Some(b'"' | b' ') = rest.first() { quoted_len(rest, byte) } else { 0 };
+                let end = rest[start..].iter().position(|&other| other == byte).map(|len| start + len);
                 self.rest = end.map(|end| &rest[end + 1..]);
                 return Some(rest[..end.unwrap_or(rest.len())].trim_ascii());
             }
@@ -131,6 +131,28 @@ impl<'a> Iterator for Cells<'a> {
         self.rest = Some(rest);
         Some(cell)
     }
+}
+
+/// Length of a value in quotes at the start of a line, whose separators do not count; 0 if a separator or the end of
+/// the line does not follow the quote. Two quotes in a row are part of the value.
+#[inline(never)]
+fn quoted_len(line: &[u8], separator: u8) -> usize {
+    let mut at = line.iter().position(|&byte| byte != b' ').unwrap_or(line.len());
+    if line.get(at) != Some(&b'"') {
+        return 0;
+    }
+    at += 1;
+    while let Some(len) = line[at..].iter().position(|&byte| byte == b'"') {
+        at += len + 1;
+        if line.get(at) == Some(&b'"') {
+            at += 1;
+            continue;
+        }
+        let after =
+            line[at..].iter().position(|&byte| byte != b' ' && byte != b'\r').map_or(line.len(), |len| at + len);
+        return if line.get(after).is_none_or(|&byte| byte == separator) { after } else { 0 };
+    }
+    0
 }
 
 /// A line without the blanks at its end. A tab at the end is kept, because it separates a last empty value.

@@ -57,6 +57,14 @@ fn constant(rows: &[Vec<Cell>], column: usize) -> bool {
     (first == 255.0 || first == 1.0) && rows.iter().all(|row| row[column].number() == first)
 }
 
+/// Whether a column has whole numbers that rise by the same step from row to row.
+pub(super) fn counts(rows: &[Vec<Cell>], column: usize) -> bool {
+    let number = |row: &Vec<Cell>| row[column].number();
+    let steps = || rows.windows(2).map(|pair| number(&pair[1]) - number(&pair[0]));
+    let step = steps().next().unwrap_or(0.0);
+    step > 0.0 && steps().all(|other| other == step) && rows.iter().all(|row| number(row).fract() == 0.0)
+}
+
 /// Whether a column has words and no numbers.
 pub(super) fn words(rows: &[Vec<Cell>], column: usize) -> bool {
     let mut cells = rows.iter().map(|row| row[column]).filter(|cell| *cell != Cell::Missing).peekable();

@@ -1,112 +1,16 @@
-//! The lines before the first point, and the meaning of the values of a row.
+//! The meaning and notation of the values of a row.
 
-use autosplats_cloud::{Crs, Error, Unit, excerpt};
+use autosplats_cloud::{Crs, Error, excerpt};
 
 use super::super::{Job, columns, columns::MAX_COLUMNS, text};
-use super::{
-    cells::{Dialect, is_missing, trimmed},
-    guess::{Cell, guessed, wide, words},
-    header::Header,
-};
+use super::cells::{Dialect, is_comment, is_count, is_missing, trimmed};
+use super::dialect::Widths;
+use super::guess::{Cell, wide, words};
+use super::naming::{Naming, Sample};
+use super::preamble::{Preamble, is_like_row};
 
 /// Rows sampled to guess the meaning of the columns.
 const SAMPLED_ROWS: usize = 1000;
-
-/// Rows of numbers required to read a file of unknown name as points; a shorter file needs all its rows to be such.
-const MIN_ROWS_OF_POINTS: usize = 2;
-
-/// The lines before the first point.
-pub(super) struct Preamble {
-    header: Option<Header>,
-    /// Number of points that a count line states.
-    pub(super) promised: Option<usize>,
-    /// First byte of the first row.
-    pub(super) start: usize,
-    pub(super) byte_order_mark: bool,
-}
-
-impl Preamble {
-    pub(super) fn parse(job: &Job<'_>) -> Result<Self, Error> {
-        let bytes = job.bytes;
-        let byte_order_mark = bytes.starts_with(b"\xef\xbb\xbf");
-        let mut at = if byte_order_mark { 3 } else { 0 };
-        let mut header: Option<Header> = None;
-        let mut promised = None;
-        let mut header_seen = false;
-        let mut looks = 0;
-        while at < bytes.len() {
-            looks += 1;
-            if looks % (1 << 14) == 0 {
-                job.tick(0.0)?;
-            }
-            let line = bytes[at..text::line_end(bytes, at)].trim_ascii();
-            if text::is_blank(line) {
-                header = Header::parse(line).filter(Header::has_axes).or(header);
-            } else if text::is_count(line) {
-                promised = std::str::from_utf8(line).ok().and_then(|line| line.parse().ok());
-                if promised.is_none() {
-                    return Err(job.malformed(job.line(at), "this count of points is too large"));
-                }
-            } else if is_row(line) || only_numbers(line) {
-                break;
-            } else if !header_seen && promised.is_none() {
-                header_seen = true;
-                header = Header::parse(line);
-            } else if let Some(named) = Header::parse(line).filter(|named| promised.is_none() && named.has_axes()) {
-                // The line before was a title.
-                header = Some(named);
-            } else {
-                let what = text::values(line).find_map(|value| Dialect::ANY.number(value).err()).unwrap_or_default();
-                return Err(job.malformed(job.line(at), what));
-            }
-            at = text::after_line_end(bytes, at);
-        }
-        if at >= bytes.len() && header_seen && !header.as_ref().is_some_and(Header::has_axes) {
-            return Err(job.malformed("line 1", "there are no points in this text: no line has x, y and z"));
-        }
-        Ok(Self { header, promised, start: at, byte_order_mark })
-    }
-}
-
-/// Whether a line is a row of values rather than a header: at least three values are numbers.
-fn is_row(line: &[u8]) -> bool {
-    // Names may contain blanks if another separator is used.
-    let separator = [b';', b'\t', b','].into_iter().find(|separator| line.contains(separator));
-    let numbers = |cells: &mut dyn Iterator<Item = &[u8]>| {
-        cells.take(MAX_COLUMNS + 1).filter(|cell| Dialect::COMMAS.number(cell).is_ok()).count()
-    };
-    3 <= match separator {
-        Some(separator) => numbers(&mut line.split(|&byte| byte == separator)),
-        None => numbers(&mut text::values(line)),
-    }
-}
-
-fn only_numbers(line: &[u8]) -> bool {
-    text::values(line).take(MAX_COLUMNS + 1).all(|value| Dialect::ANY.number(value).is_ok())
-}
-
-/// Whether a text of unknown name has rows of three or more numbers, perhaps after comments and a header.
-pub(in super::super) fn looks_like_rows(bytes: &[u8]) -> bool {
-    let start = &bytes[..bytes.len().min(1 << 13)];
-    if start.contains(&0) || std::str::from_utf8(start).is_err_and(|error| error.error_len().is_some()) {
-        return false;
-    }
-    let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
-    // The sample may end inside a line.
-    let end = if start.len() < bytes.len() { start.iter().rposition(|&byte| byte == b'\n') } else { Some(start.len()) };
-    let lines = start[..end.unwrap_or(0)].split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
-    let mut lines = lines.filter(|line| !text::is_blank(line) && !text::is_count(line)).peekable();
-    lines.next_if(|line| Header::parse(line).is_some_and(|header| header.has_axes()));
-    let rows = |line: &&[u8]| only_numbers(line) && text::values(line).count() >= 3;
-    let mut count = 0;
-    for line in lines.take(MIN_ROWS_OF_POINTS) {
-        if !rows(&line) {
-            return false;
-        }
-        count += 1;
-    }
-    count > 0
-}
 
 /// Destination of a value of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,6 +26,8 @@ pub(super) struct Layout {
     pub(super) dialect: Dialect,
     /// Destination of each value.
     pub(super) targets: Vec<Target>,
+    /// Whether more values may follow, which are left out.
+    pub(super) open: bool,
     /// Names of the fields, and whether they need `f64`.
     pub(super) fields: Vec<(String, bool)>,
     pub(super) has_color: bool,
@@ -137,56 +43,49 @@ impl Layout {
     pub(super) fn of(job: &Job<'_>, preamble: &Preamble) -> Result<Option<Self>, Error> {
         let lines = sample(job.bytes, preamble.start);
         let Some(&(first, _)) = lines.first() else { return Ok(None) };
-        let place = || job.line(first);
+        let fail = |what: String| job.malformed(job.line(first), what);
         let rows: Vec<&[u8]> = lines.iter().map(|&(_, line)| line).collect();
-        let named_columns = preamble.header.as_ref().map(Header::len);
-        let (dialect, width) = Dialect::of(&rows, named_columns).map_err(|what| job.unsupported(what))?;
-        if width < 3 {
-            return Err(job.malformed(place(), format!("{width} values; a point needs x, y and z")));
-        }
-        if width > MAX_COLUMNS {
-            return Err(job.malformed(place(), format!("more than {MAX_COLUMNS} values; are there no line ends?")));
-        }
-        let mut notes = Vec::new();
-        let mut crs = Crs::default();
-        let rows = values(&dialect, &rows, width);
         let given = columns::given(job)?;
-        let names: Vec<Option<String>> = if let Some(given) = given {
-            if given.len() != width {
-                let what = format!(
-                    "{width} values, but --columns names {}; name each column, with - for one to leave out",
-                    given.len()
-                );
-                return Err(job.malformed(place(), what));
+        let named = given.as_ref().map(|given| given.names.len()).or_else(|| preamble.headers.last().map(|h| h.len()));
+        let (dialect, widths) = Dialect::of(&rows, named).map_err(|what| job.unsupported(what))?;
+        if widths.first < 3 {
+            let lacks_z = preamble.headers.iter().find_map(|header| header.lacks_z());
+            return Err(fail(lacks_z.unwrap_or_else(|| format!("{} values; a point needs x, y and z", widths.first))));
+        }
+        if widths.first > MAX_COLUMNS {
+            return Err(fail(format!("more than {MAX_COLUMNS} values; are there no line ends?")));
+        }
+        let (start, promised) = (preamble.start, preamble.promised.is_some());
+        let sample = Sample { job, start, promised, dialect, widths, cells: cells(&dialect, &rows, widths) };
+        let (naming, header) = match given {
+            Some(columns::Given { names, open }) => {
+                (given_names(names, open, widths).map_err(fail)?, preamble.headers.last())
             }
-            given
-        } else if let Some((names, units)) =
-            preamble.header.as_ref().and_then(|header| Some((header.fitting(width)?, &header.units)))
-        {
-            named(names, units, &mut crs, &mut notes)
-        } else {
-            let names = guessed(&rows, width, preamble.promised.is_some());
-            // Three columns leave nothing to guess, and PTS defines its columns.
-            let pts = preamble.promised.is_some() && (width == 4 || width == 7 && names[4] == "red");
-            let names: Vec<Option<String>> = names.into_iter().map(Some).collect();
-            if width > 3 && !pts {
-                notes.push(columns::taken_for(&names));
-            }
-            names
+            None => Naming::of(&sample, &preamble.headers).map_err(|(at, what)| job.malformed(job.line(at), what))?,
         };
-        Ok(Some(Self::from_names(names, dialect, crs, notes, &rows, job.options.exact)))
+        let mut layout = Self::from_names(naming, dialect, &sample.cells, job.options.exact);
+        // The line of names may be the only line of words.
+        let used = header.filter(|header| !header.comment).map(|header| header.at);
+        let skipped: Vec<usize> = preamble.words.iter().copied().filter(|&at| Some(at) != used).collect();
+        if let [first, .., last] | [first @ last] = skipped[..] {
+            let what = if first == last {
+                format!("{} holds words and no point; skipped", job.line(first))
+            } else {
+                format!(
+                    "{} lines of words, {} to {}, hold no point; skipped",
+                    skipped.len(),
+                    job.line(first),
+                    job.line(last)
+                )
+            };
+            layout.notes.insert(0, what);
+        }
+        Ok(Some(layout))
     }
 
-    fn from_names(
-        mut names: Vec<Option<String>>,
-        dialect: Dialect,
-        crs: Crs,
-        mut notes: Vec<String>,
-        rows: &[Vec<Cell>],
-        exact: bool,
-    ) -> Self {
+    fn from_names(naming: Naming, dialect: Dialect, rows: &[Vec<Cell>], exact: bool) -> Self {
+        let Naming { mut names, axes, open, crs, mut notes } = naming;
         let known: Vec<String> = names.iter().map(|name| name.clone().unwrap_or_default()).collect();
-        let axes = columns::find_axes(&known).unwrap_or([0, 1, 2]);
         let color = columns::find_color(&known);
         let mut targets = Vec::with_capacity(names.len());
         let mut fields: Vec<(String, bool)> = Vec::new();
@@ -213,17 +112,39 @@ impl Layout {
                 None => Target::Skip,
             });
         }
-        Self { dialect, targets, fields, has_color: color.is_some(), crs, names, notes }
+        Self { dialect, targets, open, fields, has_color: color.is_some(), crs, names, notes }
     }
 }
 
-/// The first rows, each with its first byte.
+/// The caller's names. They have to cover each row, unless they are open.
+fn given_names(names: Vec<Option<String>>, open: bool, widths: Widths) -> Result<Naming, String> {
+    let count = names.len();
+    if open && count > widths.min {
+        return Err(format!(
+            "--columns names {count} columns before '...', but there are rows of {} values",
+            widths.min
+        ));
+    }
+    if !open && count != widths.first {
+        return Err(format!(
+            "{} values, but --columns names {count}; name each column, with - for one to leave out, or ... at the end for \
+             all others",
+            widths.first
+        ));
+    }
+    let known: Vec<String> =
+        names.iter().map(|name| name.as_deref().unwrap_or_default().to_ascii_lowercase()).collect();
+    let axes = ["x", "y", "z"].map(|axis| known.iter().position(|name| name == axis).unwrap_or_default());
+    Ok(Naming { names, axes, open, crs: Crs::default(), notes: Vec::new() })
+}
+
+/// The first rows, each with its first byte. Lines of words among them are left out, as they may end the points.
 fn sample(bytes: &[u8], start: usize) -> Vec<(usize, &[u8])> {
     let mut lines = Vec::new();
     let mut at = start;
     while at < bytes.len() && lines.len() < SAMPLED_ROWS && at - start < 1 << 20 {
         let line = trimmed(&bytes[at..text::line_end(bytes, at)]);
-        if !text::is_blank(line.trim_ascii()) && !text::is_count(line.trim_ascii()) {
+        if !is_comment(line) && !is_count(line) && (lines.is_empty() || is_like_row(line)) {
             lines.push((at, line));
         }
         at = text::after_line_end(bytes, at);
@@ -231,32 +152,22 @@ fn sample(bytes: &[u8], start: usize) -> Vec<(usize, &[u8])> {
     lines
 }
 
-/// The values of the sampled rows, up to the first row that is shorter than the first.
-fn values(dialect: &Dialect, lines: &[&[u8]], width: usize) -> Vec<Vec<Cell>> {
+/// The values of the sampled rows, without rows of unlike length and, as far as there are others, without those whose
+/// values are missing.
+fn cells(dialect: &Dialect, lines: &[&[u8]], widths: Widths) -> Vec<Vec<Cell>> {
     let cell = |value: &[u8]| match dialect.number(value) {
         _ if is_missing(value) => Cell::Missing,
         Ok(number) => Cell::Number(number),
         Err(_) => Cell::Word,
     };
+    let width = widths.first;
     let row = |line: &&[u8]| dialect.cells(line).take(width).map(cell).collect::<Vec<_>>();
-    lines.iter().map(row).take_while(|row| row.len() == width).collect()
-}
-
-/// Names from a header, and the units they state. If x, y or z is missing, the first three columns are taken for them.
-fn named(names: &[String], units: &[Option<Unit>], crs: &mut Crs, notes: &mut Vec<String>) -> Vec<Option<String>> {
-    let mut names = names.to_vec();
-    for (index, name) in names.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {
-        *name = format!("column_{}", index + 1);
+    let mut rows: Vec<Vec<Cell>> = lines.iter().map(row).collect();
+    rows.iter_mut().for_each(|row| row.resize(width.min(row.len().max(widths.min)), Cell::Missing));
+    rows.retain(|row| row.len() == width);
+    let numbers = |row: &Vec<Cell>| row.iter().filter(|cell| matches!(cell, Cell::Number(_))).count();
+    if rows.iter().any(|row| numbers(row) >= 3) {
+        rows.retain(|row| numbers(row) >= 3);
     }
-    if let Some([x, _, z]) = columns::find_axes(&names) {
-        crs.unit = if columns::is_longitude(&names[x]) { Some(Unit::Degree) } else { units[x] };
-        crs.vertical_unit = units[z].filter(|_| units[z] != crs.unit);
-        return names.into_iter().map(Some).collect();
-    }
-    for (name, axis) in names.iter_mut().zip(["x", "y", "z"]) {
-        *name = axis.into();
-    }
-    let names: Vec<Option<String>> = names.into_iter().map(Some).collect();
-    notes.push(format!("the header names no x, y and z; {}", columns::taken_for(&names)));
-    names
+    rows
 }

@@ -9,12 +9,15 @@ mod dialect;
 mod guess;
 mod header;
 mod layout;
+mod naming;
+mod numbers;
+mod preamble;
 mod rows;
 
 use autosplats_cloud::{Contents, Error, PointCloud};
 
-pub(super) use self::layout::looks_like_rows;
-use self::layout::{Layout, Preamble};
+pub(super) use self::preamble::looks_like_rows;
+use self::{layout::Layout, preamble::Preamble};
 use super::{Attribute, Description, Format, Job};
 
 pub(super) const FORMAT: Format = Format {
@@ -32,7 +35,10 @@ fn check_is_text(job: &Job<'_>) -> Result<(), Error> {
         return Err(job.malformed("byte 0", "the file is empty; copy it again"));
     }
     if let Some(at) = start.iter().position(|&byte| byte == 0) {
-        return Err(job.malformed(format!("byte {at}"), "this is not 8-bit text; save it as UTF-8 text"));
+        return Err(job.malformed(
+            format!("byte {at}"),
+            "this is not 8-bit text, nor UTF-16 with a byte order mark; save it as UTF-8 text",
+        ));
     }
     if !start.contains(&b'\n') && start.trim_ascii_end().contains(&b'\r') {
         return Err(job.unsupported("lines end in carriage returns alone; save them with line feeds"));
@@ -49,10 +55,9 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
         points: preamble.promised.map(|promised| promised as u64),
         ..Description::default()
     };
-    let encoding = if preamble.byte_order_mark { "UTF-8 with a byte order mark" } else { "UTF-8 or ASCII" };
-    description.details.push(("encoding".into(), encoding.into()));
+    description.details.push(("encoding".into(), "UTF-8 or ASCII".into()));
     if let Some(layout) = layout {
-        let mark = if layout.dialect.decimal_comma { ", decimal commas" } else { "" };
+        let mark = if layout.dialect.notation.decimal_comma { ", decimal commas" } else { "" };
         description.details.push(("separated by".into(), format!("{}{mark}", layout.dialect.separator.name())));
         let attribute = |name: &Option<String>| Attribute::new(name.as_deref().unwrap_or("-"), "text");
         description.attributes = layout.names.iter().map(attribute).collect();

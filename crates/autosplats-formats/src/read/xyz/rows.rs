@@ -14,8 +14,9 @@ use super::super::{
     units::{LOOKS_LIKE_DEGREES, look_like_degrees},
 };
 use super::{
-    cells::{Separator, is_missing, trimmed},
+    cells::{Separator, is_comment, is_count, is_missing, trimmed},
     layout::{Layout, Target},
+    preamble::is_words,
 };
 use crate::color_scale::ColorScale;
 
@@ -34,6 +35,9 @@ const MAX_LINE: usize = 1 << 16;
 /// Places in the text sampled to find the middle of the points.
 const PLACES: usize = 1024;
 
+/// Heights that models write where there is none.
+const NO_HEIGHTS: [f64; 4] = [-9999.0, -99999.0, -32767.0, -32768.0];
+
 /// Reads the rows from byte `start` on.
 pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Option<usize>) -> Result<PointCloud, Error> {
     let text = job.bytes;
@@ -42,8 +46,9 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
     let parser = Parser { layout, origin, exact: job.options.exact, counts_between: promised.is_some() };
     let mut all = Columns::new(layout);
     let mut counts_between = 0_usize;
+    let mut without = Without::default();
     let mut at = start;
-    while at < text.len() {
+    'text: while at < text.len() {
         job.tick(PARSING * (at - start) as f32 / (text.len() - start) as f32)?;
         let mut cuts = vec![at];
         while at < text.len() && cuts.len() <= BATCH {
@@ -54,19 +59,100 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
         job.preview(|| {
             let mut chunk = Columns::new(layout);
             pieces.iter().try_for_each(|piece| chunk.append(&piece.columns))?;
-            chunk.into_cloud(layout, origin, false)
+            chunk.into_cloud(&Job { progress: &(), ..*job }, layout, origin, false)
         })?;
         for piece in pieces {
-            if let Some((offset, what)) = piece.error {
-                return Err(job.malformed(job.line(offset), what));
-            }
             all.append(&piece.columns)?;
             counts_between = counts_between.saturating_add(piece.counts);
+            without.add(piece.without);
+            if let Some((offset, what)) = piece.error {
+                let Some(lines) = words_at_end(text, offset) else {
+                    return Err(job.malformed(job.line(offset), what));
+                };
+                let lines = if lines == 1 { "a line".into() } else { format!("{lines} lines") };
+                job.note(format!("{lines} of words from {} on, after the points; skipped", job.line(offset)));
+                break 'text;
+            }
         }
     }
+    without.check(job, all.positions.len())?;
     check_promise(job, all.positions.len(), promised, counts_between)?;
     job.tick(PARSING)?;
-    Ok(all.into_cloud(layout, origin, job.options.exact)?.with_crs(crs))
+    let mut cloud = all.into_cloud(job, layout, origin, job.options.exact)?.with_crs(crs);
+    drop_no_heights(job, &mut cloud);
+    Ok(cloud)
+}
+
+/// Drops points whose height stands for none, which is told by the heights of the others: they span less than they are
+/// away from it.
+fn drop_no_heights(job: &Job<'_>, cloud: &mut PointCloud) {
+    let up = cloud.origin().z;
+    let height = |point: &[f32; 3]| f64::from(point[2]) + up;
+    // Such a height is the lowest of all, which is soon found out.
+    let lowest = |points: &[[f32; 3]]| points.iter().fold(f32::INFINITY, |low, point| low.min(point[2]));
+    let lowest = cloud.positions().par_chunks(PIECE).map(lowest).reduce(|| f32::INFINITY, f32::min);
+    if !NO_HEIGHTS.contains(&(f64::from(lowest) + up)) {
+        return;
+    }
+    let none = [(f64::INFINITY, f64::NEG_INFINITY); 2];
+    // The range of the heights that stand for none, and that of the others.
+    let add = |mut ranges: [(f64, f64); 2], point: &[f32; 3]| {
+        let height = height(point);
+        let (low, high) = &mut ranges[usize::from(!NO_HEIGHTS.contains(&height))];
+        (*low, *high) = (low.min(height), high.max(height));
+        ranges
+    };
+    let join = |a: [(f64, f64); 2], b: [(f64, f64); 2]| [0, 1].map(|i| (a[i].0.min(b[i].0), a[i].1.max(b[i].1)));
+    let [marks, others] = cloud.positions().par_iter().fold(|| none, add).reduce(|| none, join);
+    if marks.0 > marks.1 || others.0 > others.1 || !(others.0 - marks.1 > others.1 - others.0) {
+        return;
+    }
+    let keep: Vec<bool> = cloud.positions().par_iter().map(|point| !NO_HEIGHTS.contains(&height(point))).collect();
+    let (before, value) = (keep.len(), marks.0);
+    cloud.retain(|i| keep[i]);
+    let count = before - cloud.len();
+    job.note(format!("{count} of {before} points have the height {value}, which stands for none; left out"));
+}
+
+/// Rows without coordinates.
+#[derive(Default)]
+struct Without {
+    count: usize,
+    /// How many of them hold no value at all.
+    empty: usize,
+    /// The first: its first byte, and what is missing.
+    first: Option<(usize, String)>,
+}
+
+impl Without {
+    fn add(&mut self, other: Self) {
+        self.count += other.count;
+        self.empty += other.empty;
+        self.first = self.first.take().or(other.first);
+    }
+
+    /// Tells of them. A text in which most rows are so has other columns than was thought.
+    fn check(self, job: &Job<'_>, points: usize) -> Result<(), Error> {
+        let Some((at, what)) = self.first else { return Ok(()) };
+        let (count, rows) = (self.count, self.count + points);
+        if self.count - self.empty >= points {
+            let what = format!("{what}, as in {count} of {rows} rows; name the columns with --columns");
+            return Err(job.malformed(job.line(at), what));
+        }
+        job.note(format!("{count} of {rows} rows have no coordinates; skipped, the first in {}", job.line(at)));
+        Ok(())
+    }
+}
+
+/// Number of the lines from byte `at` to the end, if all are words and few.
+fn words_at_end(text: &[u8], at: usize) -> Option<usize> {
+    let rest = &text[at..];
+    if rest.len() > MAX_LINE {
+        return None;
+    }
+    let lines = rest.split(|&byte| byte == b'\n').map(text::trim).filter(|line| !text::is_blank(line));
+    let lines: Vec<&[u8]> = lines.collect();
+    lines.iter().all(|line| is_words(line)).then_some(lines.len())
 }
 
 /// Compares the number of rows with the stated counts.
@@ -199,7 +285,7 @@ impl Columns {
         Ok(())
     }
 
-    fn into_cloud(self, layout: &Layout, origin: DVec3, exact: bool) -> Result<PointCloud, Error> {
+    fn into_cloud(self, job: &Job<'_>, layout: &Layout, origin: DVec3, exact: bool) -> Result<PointCloud, Error> {
         let mut positions = self.positions;
         positions.shrink_to_fit();
         let mut cloud = PointCloud::new(origin, positions);
@@ -207,7 +293,7 @@ impl Columns {
             cloud = cloud.with_residuals(self.residuals)?;
         }
         if layout.has_color {
-            cloud = with_colors(cloud, self.colors, exact)?;
+            cloud = with_colors(job, cloud, self.colors, exact)?;
         }
         for ((name, _), values) in layout.fields.iter().zip(self.fields) {
             let values = match values {
@@ -236,15 +322,15 @@ fn floats(bytes: &[[u8; 3]]) -> Result<Vec<[f32; 3]>, Error> {
     Ok(floats)
 }
 
-fn with_colors(cloud: PointCloud, colors: Colors, exact: bool) -> Result<PointCloud, Error> {
+fn with_colors(job: &Job<'_>, cloud: PointCloud, colors: Colors, exact: bool) -> Result<PointCloud, Error> {
     let floats = match colors {
         // If no value exceeds 1, the colours are rather floats that happen to be 0 or 1.
         Colors::Bytes(bytes) if bytes.par_iter().flatten().any(|&value| value > 1) => return cloud.with_colors(bytes),
         Colors::Bytes(bytes) => floats(&bytes)?,
         Colors::Floats(floats) => floats,
     };
-    let largest = floats.par_iter().flatten().copied().reduce(|| 0.0, f32::max);
-    let scale = ColorScale::of(largest.into(), true);
+    let scale = ColorScale::of(floats.len(), true, |i| floats[i].map(f64::from));
+    scale.note().iter().for_each(|note| job.note(note));
     let mut bytes = Vec::new();
     reserve(&mut bytes, floats.len(), "colours")?;
     bytes.par_extend(floats.par_iter().map(|color| color.map(|value| scale.byte(value.into()))));
@@ -271,6 +357,7 @@ struct Piece {
     columns: Columns,
     /// Sum of the counts between rows.
     counts: usize,
+    without: Without,
     error: Option<(usize, String)>,
 }
 
@@ -284,58 +371,73 @@ struct Parser<'a> {
 
 impl Parser<'_> {
     fn piece(&self, text: &[u8], start: usize) -> Piece {
-        let mut piece = Piece { columns: Columns::new(self.layout), counts: 0, error: None };
+        let columns = Columns::new(self.layout);
+        let mut piece = Piece { columns, counts: 0, without: Without::default(), error: None };
         let mut fields = vec![0.0; self.layout.fields.len()];
         let mut at = 0;
         while at < text.len() {
             let end = text::line_end(text, at);
             let line = trimmed(&text[at..end]);
-            let empty = line.iter().all(u8::is_ascii_whitespace);
-            if self.counts_between && text::is_count(line.trim_ascii()) {
+            if self.counts_between && is_count(line) {
                 let count = std::str::from_utf8(line.trim_ascii()).ok().and_then(|line| line.parse().ok());
                 piece.counts = piece.counts.saturating_add(count.unwrap_or(usize::MAX));
-            } else if !empty
-                && !text::is_blank(line.trim_ascii_start())
-                && let Err(what) = self.row(line, &mut piece.columns, &mut fields)
-            {
-                piece.error = Some((start + at, what));
-                break;
+            } else if !(line.is_empty() || matches!(line[0], b'#' | b'/' | b' ' | b'\t') && is_comment(line)) {
+                match self.row(line, &mut piece.columns, &mut fields) {
+                    Ok(()) => {}
+                    Err(Odd::Without(what)) => {
+                        let empty = self.layout.dialect.cells(line).all(<[u8]>::is_empty);
+                        let first = Some((start + at, what));
+                        piece.without.add(Without { count: 1, empty: usize::from(empty), first });
+                    }
+                    Err(Odd::Broken(what)) => {
+                        piece.error = Some((start + at, what));
+                        break;
+                    }
+                }
             }
             at = end + 1;
         }
         piece
     }
 
-    fn row(&self, line: &[u8], columns: &mut Columns, fields: &mut [f64]) -> Result<(), String> {
-        let Layout { dialect, targets, .. } = self.layout;
-        let mut cells = dialect.cells(line);
+    fn row(&self, line: &[u8], columns: &mut Columns, fields: &mut [f64]) -> Result<(), Odd> {
+        let Layout { dialect, targets, open, .. } = self.layout;
+        let mut cells = dialect.cells(text::without_mark(line));
         let (mut world, mut color) = (DVec3::ZERO, [0.0; 3]);
+        let mut missing = None;
         for (index, target) in targets.iter().enumerate() {
             let cell = cells.next().ok_or_else(|| {
-                format!("{index} values where a point has {}; complete or remove the line", targets.len())
+                let count = targets.len();
+                Odd::Broken(format!("{index} values where a point has {count}; complete or remove the line"))
             })?;
             // Numbers are tried first, because values are hardly ever missing.
             let value = || match dialect.number(cell) {
                 Err(_) if is_missing(cell) => Ok(f64::NAN),
-                value => value,
+                value => value.map_err(Odd::Broken),
             };
             match *target {
                 Target::Skip => {}
-                Target::Axis(axis) => {
-                    world[axis] = dialect.number(cell).map_err(|what| {
-                        if is_missing(cell) { format!("{} is missing", ["x", "y", "z"][axis]) } else { what }
-                    })?;
-                }
+                Target::Axis(axis) => match dialect.number(cell) {
+                    Ok(number) => world[axis] = number,
+                    Err(_) if is_missing(cell) => missing = missing.or(Some(axis)),
+                    Err(what) => return Err(Odd::Broken(what)),
+                },
                 Target::Channel(channel) => color[channel] = value()?,
                 Target::Field(field) => fields[field] = value()?,
             }
         }
-        if let Some(more) = cells.next() {
+        if !open && let Some(more) = cells.next() {
             let trailing = dialect.separator != Separator::Any && more.is_empty() && cells.next().is_none();
             if !trailing {
-                let what = format!("more values than the {} a point has, from '{}' on", targets.len(), excerpt(more));
-                return Err(what);
+                let count = targets.len();
+                return Err(Odd::Broken(format!(
+                    "more values than the {count} a point has, from '{}' on; '...' at the end of --columns leaves them out",
+                    excerpt(more)
+                )));
             }
+        }
+        if let Some(axis) = missing {
+            return Err(Odd::Without(format!("{} is missing", ["x", "y", "z"][axis])));
         }
         columns.positions.push((world - self.origin).as_vec3().to_array());
         if self.exact {
@@ -352,6 +454,14 @@ impl Parser<'_> {
         }
         Ok(())
     }
+}
+
+/// Why a row is no point.
+enum Odd {
+    /// A coordinate is missing.
+    Without(String),
+    /// The row is not of the layout.
+    Broken(String),
 }
 
 impl Colors {

@@ -84,9 +84,9 @@ fn in_metres(job: &Job<'_>) -> Result<Option<PointCloud>, Error> {
 fn notes(job: &Job<'_>, known: &CloudFacts<'_>) {
     let cloud = job.cloud;
     let is_lost = match cloud.axes() {
-        Some(Axes::YUp | Axes::Camera) => true,
         // Readers assume Z up for clouds that are large or were scanned.
         Some(Axes::ZUp) => cloud.is_small() && cloud.scans().is_empty(),
+        Some(_) => true,
         None => false,
     };
     if is_lost {

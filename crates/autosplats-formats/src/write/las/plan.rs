@@ -61,8 +61,9 @@ impl<'a> Plan<'a> {
         if !cloud.scans().is_empty() {
             job.note("LAS cannot hold sensor positions; they are left out");
         }
-        if matches!(cloud.axes(), Some(Axes::YUp | Axes::Camera)) {
-            job.note("LAS does not store which axis is up; readers assume z, but here it is y");
+        if let Some(axes) = cloud.axes().filter(|&axes| axes != Axes::ZUp) {
+            let up = if axes == Axes::Camera { Axes::YDown } else { axes }.name();
+            job.note(format!("LAS does not store which axis is up; readers assume z-up, but here it is {up}"));
         }
         let point = |i: usize| kept.as_ref().map_or(i, |kept| kept[i]);
         let grid = grid::Grid::of(job, count, |i| cloud.world_position(point(i)))?;

@@ -97,7 +97,7 @@ pub(crate) fn export(
     progress: &dyn Progress,
 ) -> Result<Exported, ExportError> {
     check_writable(path)?;
-    let target = check_target(document, path, replace)?;
+    check_target(document, path, replace)?;
     let layers = document.layers.iter().filter(|layer| match what {
         ExportScope::Shown | ExportScope::Selected => layer.visible,
         ExportScope::Layer(id) => layer.id == id,
@@ -126,7 +126,7 @@ pub(crate) fn export(
             Cow::Owned(PointCloud::merged(&clouds.iter().map(|cloud| (&**cloud, DMat4::IDENTITY)).collect::<Vec<_>>()))
         }
     };
-    write(&cloud, &target, progress)?;
+    write(&cloud, path, progress)?;
     Ok(Exported { points: cloud.len() })
 }
 
@@ -221,12 +221,12 @@ fn tell_losses(clouds: &[Cow<'_, PointCloud>], progress: &dyn Progress) {
     }
 }
 
-/// Refuses files that must not be replaced. Returns the path to write, with links resolved.
-fn check_target(document: &Document, path: &Path, replace: Replace) -> Result<PathBuf, ExportError> {
+/// Refuses files that must not be replaced.
+fn check_target(document: &Document, path: &Path, replace: Replace) -> Result<(), ExportError> {
     let Ok(target) = path.canonicalize() else {
         // A dangling link also counts as an existing file.
         let there = path.symlink_metadata().is_ok() && replace < Replace::Files;
-        return if there { Err(ExportError::Exists { path: path.into() }) } else { Ok(path.into()) };
+        return if there { Err(ExportError::Exists { path: path.into() }) } else { Ok(()) };
     };
     let input = document.layers.iter().find(|layer| {
         let path = layer.path.as_ref().and_then(|path| path.canonicalize().ok());
@@ -237,6 +237,6 @@ fn check_target(document: &Document, path: &Path, replace: Replace) -> Result<Pa
             Err(ExportError::Input { path: path.into(), layer: layer.name.clone() })
         }
         None if replace < Replace::Files => Err(ExportError::Exists { path: path.into() }),
-        _ => Ok(target),
+        _ => Ok(()),
     }
 }

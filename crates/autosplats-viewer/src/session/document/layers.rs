@@ -7,7 +7,7 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::{Counts, Document, Layer, LayerId, bounds_of, layer::Edits};
+use super::{Bits, Counts, Document, Layer, LayerId, bounds_of, layer::Edits};
 
 /// Largest number of points of an overview: enough to find the size of a scene.
 const OVERVIEW_POINT_COUNT: usize = 100_000;
@@ -72,6 +72,11 @@ impl Document {
             layer.local = cloud.local_metres(layer.local.as_ref());
             (layer.cloud, layer.edits) = (Arc::clone(cloud), Edits::default());
         });
+    }
+
+    /// Hides these points of a layer and shows all others.
+    pub(crate) fn set_hidden(&mut self, id: LayerId, hidden: &Bits) {
+        self.change(id, |layer| layer.edits.hidden = hidden.clone());
     }
 
     /// Sets whether points are still to come or to change, so that the layer cannot be edited.

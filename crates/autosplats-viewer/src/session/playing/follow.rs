@@ -7,6 +7,7 @@ use autosplats_sources::Source;
 
 use super::thread::StreamThread;
 use super::{PlayingInput, RemovedInput};
+use crate::session::document::Bits;
 use crate::session::{Appearance, FirstLook, Input, LayerId, Session};
 
 impl Session {
@@ -25,7 +26,7 @@ impl Session {
         self.messages.note(format!("{} is opened again", input.name));
         let thread = StreamThread::start(input.clone(), self.loader.frame.clone(), self.loader.context().clone());
         match self.playing.streams.iter_mut().find(|moving| moving.layer == Some(id)) {
-            Some(moving) => (moving.thread, moving.frame) = (thread, None),
+            Some(moving) => (moving.input, moving.thread, moving.frame) = (input, thread, None),
             None => {
                 let moving = PlayingInput::new(input, thread, Appearance::default());
                 self.playing.streams.push(PlayingInput { layer: Some(id), ..moving });
@@ -163,9 +164,9 @@ impl Session {
             // These points were requested before the edit.
             Some(id) if self.history.is_unsaved(id) => return,
             Some(id) => self.fill(id, cloud),
-            None if cloud.is_empty() => return,
+            None if !cloud.has_finite(1) => return,
             None => {
-                let known = || FirstLook::of(&moving.input, cloud, self.loader.frame.get());
+                let known = || FirstLook::of(&moving.input, cloud, &Bits::default(), self.loader.frame.get());
                 let glance = glance.unwrap_or_else(known);
                 let PlayingInput { input, appearance, .. } = moving;
                 let (input, appearance) = (input.clone(), *appearance);

@@ -8,12 +8,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 
 use autosplats::cloud::{Error, PointCloud, Progress};
-use autosplats_formats::ReadOptions;
 use autosplats_sources::Player;
 use eframe::egui;
 
 use crate::messages::MessageSender;
-use crate::session::{Input, LayerId};
+use crate::session::{Input, LayerId, read_options};
 
 /// Pictures whose points are read ahead, besides the one in work.
 const AHEAD: usize = 1;
@@ -109,8 +108,8 @@ fn read(
 ) -> Result<(), Error> {
     let followers: Vec<_> = tracks.iter().map(|track| Follower { input: &track.input, mail, cancelled }).collect();
     let open = |follower: &Follower<'_>| {
-        let Input { source, play, options, .. } = follower.input;
-        source.play(play, &ReadOptions { exact: true, ..options.clone() }, follower)
+        let Input { source, play, .. } = follower.input;
+        source.play(play, &read_options(follower.input), follower)
     };
     let mut players = followers.iter().map(open).collect::<Result<Vec<Player>, Error>>()?;
     let pictures = tracks.iter().map(|track| track.frames.len()).max().unwrap_or_default();

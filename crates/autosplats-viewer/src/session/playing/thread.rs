@@ -4,11 +4,12 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use autosplats::cloud::{Error, PointCloud, Progress};
-use autosplats_formats::ReadOptions;
 use autosplats_sources::{Statistics, Timeline};
 use eframe::egui;
 
-use crate::session::{FirstLook, Input, SharedViewFrame};
+use crate::session::document::Bits;
+use crate::session::loading::moves_bar;
+use crate::session::{FirstLook, Input, SharedViewFrame, read_options};
 
 /// Longest silence of a live stream before the thread checks whether the stream is still wanted.
 const SILENCE_LIMIT: Duration = Duration::from_millis(100);
@@ -147,10 +148,10 @@ impl Progress for Follower<'_> {
         if post.begun {
             return;
         }
-        let before = std::mem::replace(&mut post.read, fraction.clamp(0.0, 1.0));
+        let fraction = fraction.clamp(0.0, 1.0);
+        let before = std::mem::replace(&mut post.read, fraction);
         drop(post);
-        // A progress bar 100 pixels long needs 100 repaints.
-        if (100.0 * before) as u32 != (100.0 * fraction) as u32 {
+        if moves_bar(before, fraction) {
             self.context.request_repaint();
         }
     }
@@ -176,8 +177,7 @@ fn run(
     context: &egui::Context,
 ) -> Result<(), Error> {
     let follower = Follower { shared, context };
-    let options = ReadOptions { exact: true, ..input.options.clone() };
-    let mut player = input.source.play(&input.play, &options, &follower)?;
+    let mut player = input.source.play(&input.play, &read_options(input), &follower)?;
     let timeline = player.stream().timeline().cloned().map(Arc::new);
     {
         let mut post = shared.lock();
@@ -207,15 +207,15 @@ fn run(
                 next => next?,
             },
         };
-        let first = cloud.as_ref().filter(|cloud| !cloud.is_empty() && !shared.lock().begun);
-        let glance = first.map(|cloud| FirstLook::of(input, cloud, view.get()));
+        let first = cloud.as_ref().filter(|cloud| cloud.has_finite(1) && !shared.lock().begun);
+        let glance = first.map(|cloud| FirstLook::of(input, cloud, &Bits::default(), view.get()));
         let mut post = shared.lock();
         let news = cloud.filter(|_| wanted.is_some() || !post.paused || !post.begun);
         let statistics = player.stream().statistics();
         let changed = news.is_some() || statistics != post.statistics;
         post.statistics = statistics;
         if let Some(cloud) = news {
-            post.begun |= !cloud.is_empty();
+            post.begun |= cloud.has_finite(1);
             if glance.is_some() {
                 post.news.glance = glance;
             }

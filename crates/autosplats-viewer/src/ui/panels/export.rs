@@ -1,6 +1,6 @@
 //! The dialog to export points, and the export on a thread of its own.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -207,9 +207,4 @@ fn saved_layers(document: &Document, what: ExportScope) -> Vec<LayerId> {
         ExportScope::Selected => false,
     };
     document.layers.iter().filter(complete).map(|layer| layer.id).collect()
-}
-
-/// Whether a path has an extension, in any case.
-pub(super) fn has_extension(path: &Path, extension: &str) -> bool {
-    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
 }

@@ -1,6 +1,6 @@
 //! The list of inputs, and the window with information on a point.
 
-use autosplats::cloud::glam::DVec3;
+use autosplats::cloud::{PointFilter, glam::DVec3};
 use eframe::egui;
 
 use super::layer::{Naming, naming};
@@ -92,6 +92,16 @@ impl Inputs {
                     }
                 }
                 ui.small(figures);
+                let filtered = session.inputs.get(&id).is_some_and(|input| {
+                    !input.source.moves() && input.options.keep.as_ref().is_none_or(|filter| !filter.is_all())
+                });
+                if filtered && counts.hidden > 0 {
+                    let show =
+                        ui.small_button("Show").on_hover_text("Show all its points, noise and withheld ones too");
+                    if show.clicked() {
+                        actions.push(Action::Keep(id, PointFilter::all()));
+                    }
+                }
                 ui.menu_button("…", |ui| self.menu(ui, session, layer, actions))
                     .response
                     .on_hover_text("Actions for this input");

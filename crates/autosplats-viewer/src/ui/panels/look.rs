@@ -118,7 +118,7 @@ fn color(ui: &mut egui::Ui, look: &mut Look, picture: Option<&Picture>) {
             shading.range = given.then_some([0.0, 1.0]);
         }
         if let Some([low, high]) = &mut shading.range {
-            let speed = f64::from((*high - *low).abs()) * 0.01 + 1e-6;
+            let speed = (*high - *low).abs() * 0.01 + 1e-6;
             ui.add(DragValue::new(low).speed(speed));
             ui.add(DragValue::new(high).speed(speed));
             if !(*low < *high) {

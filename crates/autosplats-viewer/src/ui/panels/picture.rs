@@ -6,9 +6,9 @@ use std::sync::mpsc::{Receiver, channel};
 
 use autosplats::cloud::check_memory;
 use autosplats::{BYTES_PER_PIXEL, MAX_SIDE};
+use autosplats_output::PictureFormat;
 use eframe::egui;
 
-use super::export::has_extension;
 use super::target_file::{DialogTexts, TargetFile, Write};
 use crate::session::Session;
 use crate::view::{Goal, Task, View};
@@ -63,8 +63,8 @@ impl PictureDialog {
                 });
             });
             let bytes = u64::from(self.size[0]) * u64::from(self.size[1]) * BYTES_PER_PIXEL;
-            let problem = if !has_extension(&self.target.path(), "png") {
-                Some("The name has to end in .png".to_owned())
+            let problem = if PictureFormat::of(&self.target.path()).is_none() {
+                Some("The name has to end in .png or .jpg".to_owned())
             } else {
                 check_memory("this picture", bytes).err().map(|error| error.to_string())
             };

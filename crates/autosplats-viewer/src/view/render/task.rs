@@ -78,7 +78,7 @@ pub(crate) enum Outcome {
     Picked { purpose: Purpose, point: Option<PickHit> },
     /// For each shown point, whether it is in the region.
     Selected { shown: Arc<ShownCloud>, hits: Vec<bool>, mode: SelectMode },
-    /// A picture of the requested size, and the value range of its colours.
+    /// A picture of the requested size, and the ends of its colour map.
     Photographed { image: Box<Image>, range: Option<[f64; 2]>, goal: Goal },
 }
 

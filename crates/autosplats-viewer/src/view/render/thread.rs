@@ -219,8 +219,7 @@ impl RenderState {
         if wish.budget_ms.is_none() && wish.dots.is_none() && still_supersample(wish.size) > 1 {
             settings.all_layers = selected.is_some();
             // The supersampled picture keeps the value range of this one.
-            settings.shading.range =
-                settings.shading.range.or(counts.value_range.map(|range| range.map(|end| end as f32)));
+            settings.shading.range = settings.shading.range.or_else(|| counts.range());
             *finer = Some(Finer { wish: wish.clone(), settings });
         }
         let depths = Depths::new(layers);
@@ -339,7 +338,7 @@ impl RenderState {
                         1 => enlarge(frame.image, wish.size),
                         _ => frame.image.averaged(supersample),
                     };
-                    Ok((Box::new(image), frame.counts.value_range))
+                    Ok((Box::new(image), frame.counts.range()))
                 };
                 let supersample = if is_film || wish.dots.is_some() { 1 } else { still_supersample(wish.size) };
                 let (image, range) = match render(supersample) {

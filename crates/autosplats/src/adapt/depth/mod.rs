@@ -23,6 +23,7 @@ use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::camera::View;
+use crate::cancel::Cancel;
 use crate::fit::orient::runs;
 
 /// Fewest points of a scan that give a law.
@@ -86,11 +87,12 @@ struct Law {
 
 impl DepthNoise {
     /// Estimates the noise of each scan of `cloud`.
-    pub(crate) fn new(cloud: &PointCloud) -> Self {
+    pub(crate) fn new(cloud: &PointCloud, cancel: &Cancel<'_>) -> Self {
         let runs = runs(cloud);
         let known = runs.iter().filter(|(_, scan)| scan.is_some()).count().max(1);
         let ends = runs.iter().skip(1).map(|(first, _)| *first as usize).chain([cloud.len()]);
         let of_run = |(&(first, scan), end): (&(u32, Option<&Scan>), usize)| {
+            let scan = scan.filter(|_| !cancel.is_given_up());
             let found = scan.and_then(|scan| law_of_scan(cloud, scan, first as usize..end, known));
             DepthRun { first, ..found.unwrap_or_else(bytemuck::Zeroable::zeroed) }
         };

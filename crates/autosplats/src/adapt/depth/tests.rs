@@ -24,7 +24,7 @@ fn by_camera(positions: Positions) -> PointCloud {
 
 /// Factor and power of the only run.
 fn law(cloud: &PointCloud) -> Option<(f32, f32)> {
-    let noise = DepthNoise::new(cloud);
+    let noise = DepthNoise::new(cloud, &crate::cancel::NEVER);
     assert!(noise.runs.len() <= 1, "of one scan: {noise:?}");
     noise.runs.first().map(|run| (run.factor, run.power))
 }
@@ -71,7 +71,7 @@ fn the_sensor_may_stand_and_look_anywhere() {
                 .iter()
                 .map(|point| (axis.inverse() * DVec3::from(point.map(f64::from))).as_vec3().to_array())
                 .collect();
-            let noise = DepthNoise::new(&seen_from(pose, origin, &turned));
+            let noise = DepthNoise::new(&seen_from(pose, origin, &turned), &crate::cancel::NEVER);
             let [run] = noise.runs[..] else { panic!("{turn} {axis}: {noise:?}") };
             let looks = (turn * DVec3::Z).as_vec3();
             assert!(near(Some((run.factor, run.power)), STEP / 3f32.sqrt(), 2.0, 0.01), "{turn} {axis}: {run:?}");
@@ -191,7 +191,7 @@ fn each_scan_has_its_own() {
         points: index * each..(index + 1) * each,
     };
     let cloud = PointCloud::new(DVec3::ZERO, positions).with_scans(vec![scan(0), scan(1), scan(2)]);
-    let noise = DepthNoise::new(&cloud);
+    let noise = DepthNoise::new(&cloud, &crate::cancel::NEVER);
     let at = |point: usize| noise.at(Vec3::new(0.3, 0.4, 2.0), point as u32).map(|known| known.noise);
     for (point, step) in [(0, STEP), (each - 1, STEP), (each, 2.0 * STEP), (2 * each - 1, 2.0 * STEP)] {
         let found = at(point).expect("noise");
@@ -211,7 +211,7 @@ fn noise_is_of_the_sensors_distance_not_the_eyes() {
         projection: Projection::PerspectiveFovDeg(40.0),
     };
     let view = camera.view(DVec3::ZERO, [64, 48]).expect("a view");
-    let noise = DepthNoise::new(&cloud);
+    let noise = DepthNoise::new(&cloud, &crate::cancel::NEVER);
     let place = Vec3::new(0.5, -0.25, 3.0);
     let own = noise.at(place, 7).expect("noise");
     let seen = noise.seen_by(&view).at(view.view_from_world * (place - view.eye_local), 7).expect("noise");

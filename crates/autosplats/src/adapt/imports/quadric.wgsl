@@ -87,6 +87,21 @@ fn cluster_up_to(cell: u32, last: u32, slab: u32) -> vec4f {
     return select(vec4f(0.0), cluster, cell <= last);
 }
 
+// The clusters of four cells from `cell` on, a column each; without points after `last`.
+fn four_clusters(cell: u32, last: u32, slab: u32) -> mat4x4f {
+    return mat4x4f(
+        clusters[cluster_at(cell, slab)],
+        cluster_up_to(cell + 1u, last, slab),
+        cluster_up_to(cell + 2u, last, slab),
+        cluster_up_to(cell + 3u, last, slab),
+    );
+}
+
+// Whether four clusters have no points.
+fn are_empty(four: mat4x4f) -> bool {
+    return four[0].w + four[1].w + four[2].w + four[3].w == 0.0;
+}
+
 // Surface variation, 0 to 1/3.
 fn curvature_of(plane: Plane) -> f32 {
     let sum = plane.variances.x + plane.variances.y + plane.variances.z;
@@ -130,17 +145,14 @@ fn plane_beside(ball: Ball, side: vec3f, limit: f32) -> Plane {
         let last = cells + ball.high.x;
         for (var cell = cells + ball.low.x + start.x; cell <= last; cell += step.x) {
             for (var slab = 0u; slab < SLABS; slab++) {
-                let a = clusters[cluster_at(cell, slab)];
-                let b = cluster_up_to(cell + 1u, last, slab);
-                let c = cluster_up_to(cell + 2u, last, slab);
-                let d = cluster_up_to(cell + 3u, last, slab);
-                if a.w + b.w + c.w + d.w == 0.0 {
+                let four = four_clusters(cell, last, slab);
+                if are_empty(four) {
                     break;
                 }
-                add_to_plane(&own, weighed(ball, per_radius, a), side, limit);
-                add_to_plane(&own, weighed(ball, per_radius, b), side, limit);
-                add_to_plane(&own, weighed(ball, per_radius, c), side, limit);
-                add_to_plane(&own, weighed(ball, per_radius, d), side, limit);
+                add_to_plane(&own, weighed(ball, per_radius, four[0]), side, limit);
+                add_to_plane(&own, weighed(ball, per_radius, four[1]), side, limit);
+                add_to_plane(&own, weighed(ball, per_radius, four[2]), side, limit);
+                add_to_plane(&own, weighed(ball, per_radius, four[3]), side, limit);
             }
         }
     }
@@ -216,17 +228,14 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
         let last = cells + ball.high.x;
         for (var cell = cells + ball.low.x + start.x; cell <= last; cell += step.x) {
             for (var slab = 0u; slab < SLABS; slab++) {
-                let a = clusters[cluster_at(cell, slab)];
-                let b = cluster_up_to(cell + 1u, last, slab);
-                let c = cluster_up_to(cell + 2u, last, slab);
-                let d = cluster_up_to(cell + 3u, last, slab);
-                if a.w + b.w + c.w + d.w == 0.0 {
+                let four = four_clusters(cell, last, slab);
+                if are_empty(four) {
                     break;
                 }
-                add_to_quadric(&own, weighed(ball, per_radius, a), u, v, axis);
-                add_to_quadric(&own, weighed(ball, per_radius, b), u, v, axis);
-                add_to_quadric(&own, weighed(ball, per_radius, c), u, v, axis);
-                add_to_quadric(&own, weighed(ball, per_radius, d), u, v, axis);
+                add_to_quadric(&own, weighed(ball, per_radius, four[0]), u, v, axis);
+                add_to_quadric(&own, weighed(ball, per_radius, four[1]), u, v, axis);
+                add_to_quadric(&own, weighed(ball, per_radius, four[2]), u, v, axis);
+                add_to_quadric(&own, weighed(ball, per_radius, four[3]), u, v, axis);
             }
         }
     }

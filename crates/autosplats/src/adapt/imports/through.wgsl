@@ -27,17 +27,14 @@ fn seen(ball: Ball, axis: vec3f, half_thickness: f32) -> SeenAtDisc {
         for (var cell = cells + ball.low.x + start.x; cell <= last; cell += step.x) {
             var points = array<vec2f, 4>();
             for (var slab = 0u; slab < SLABS; slab++) {
-                let a = clusters[cluster_at(cell, slab)];
-                let b = cluster_up_to(cell + 1u, last, slab);
-                let c = cluster_up_to(cell + 2u, last, slab);
-                let d = cluster_up_to(cell + 3u, last, slab);
-                if a.w + b.w + c.w + d.w == 0.0 {
+                let four = four_clusters(cell, last, slab);
+                if are_empty(four) {
                     break;
                 }
-                points[0] += seen_of(ball, axis, half_thickness, a);
-                points[1] += seen_of(ball, axis, half_thickness, b);
-                points[2] += seen_of(ball, axis, half_thickness, c);
-                points[3] += seen_of(ball, axis, half_thickness, d);
+                points[0] += seen_of(ball, axis, half_thickness, four[0]);
+                points[1] += seen_of(ball, axis, half_thickness, four[1]);
+                points[2] += seen_of(ball, axis, half_thickness, four[2]);
+                points[3] += seen_of(ball, axis, half_thickness, four[3]);
             }
             own += with_cell(points[0]) + with_cell(points[1]) + with_cell(points[2]) + with_cell(points[3]);
         }

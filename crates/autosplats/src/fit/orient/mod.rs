@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::Surfel;
 use crate::camera::View;
+use crate::cancel::Cancel;
 
 /// Cosine of the angle between the normal and the direction to the sensor above which the sensor's side is certain.
 pub(super) const MIN_SENSOR_COSINE: f32 = 0.15;
@@ -104,11 +105,12 @@ impl Sensors {
     }
 
     /// Marks the surfels that show their back.
-    pub(crate) fn orient(&self, surfels: &mut [Surfel], view: &View) {
+    pub(crate) fn orient(&self, surfels: &mut [Surfel], view: &View, cancel: &Cancel<'_>) {
         if self.runs.is_empty() {
             return;
         }
-        surfels.par_chunks_mut(TASK_SURFELS).flatten_iter().for_each(|surfel| {
+        let tasks = surfels.par_chunks_mut(TASK_SURFELS).filter(|_| !cancel.is_given_up());
+        tasks.flatten_iter().for_each(|surfel| {
             let sensor = self.of(surfel.source).map(|sensor| view.view_from_world * (sensor - view.eye_local));
             if sensor.is_some_and(|sensor| is_seen_from_behind(surfel, sensor, view)) {
                 surfel.screen_and_flags |= Surfel::BACK;

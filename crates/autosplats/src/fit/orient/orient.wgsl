@@ -44,12 +44,12 @@ fn is_seen_from_behind(surfel: Surfel, sensor: vec3f) -> bool {
         && dot(surfel.normal, eye) > max(rough, MIN_EYE_COSINE) * length(eye);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn orient(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let active_points = counters[ACTIVE];
     let first = select(0u, active_points, ROUND == 1u);
     let len = select(active_points, counters[RECOVERED], ROUND == 1u);
-    let index = group_index(workgroup) * 64u + local;
+    let index = group_index(workgroup) * SMALL_GROUP + local;
     if index >= len {
         return;
     }

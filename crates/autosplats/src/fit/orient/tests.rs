@@ -5,6 +5,7 @@ use autosplats_cloud::glam::{DMat4, DVec3};
 use super::gpu::{OrientPasses, sensor_buffer, write_sensors};
 use super::*;
 use crate::camera::{Camera, Projection};
+use crate::cancel::NEVER;
 use crate::gpu::{Clock, FrameUniform, Gpu, Recorder, read_back, test_gpu};
 use crate::project::Round;
 use crate::project::gpu::tests::find_work;
@@ -56,7 +57,7 @@ fn who_knows_no_sensor_has_none() {
         assert!(!has_sensors(&cloud) && Sensors::new(&cloud) == Sensors::default());
         let view = view(Projection::PerspectiveFovDeg(30.0));
         let mut surfels = [Surfel { source: 4, normal: [0.0, 0.0, -1.0], ..Surfel::default() }];
-        Sensors::new(&cloud).orient(&mut surfels, &view);
+        Sensors::new(&cloud).orient(&mut surfels, &view, &NEVER);
         assert!(!surfels[0].shows_back(), "nothing is known");
     }
 }
@@ -87,7 +88,7 @@ fn only_what_is_sure_is_a_back() {
         let backs = |sensor: DVec3, normals: &[Vec3]| {
             let mut surfels = at_the_origin(normals);
             let sensors = Sensors::new(&cloud(1, vec![scan(ORIGIN + sensor, 0..1)]));
-            sensors.orient(&mut surfels, &view);
+            sensors.orient(&mut surfels, &view, &NEVER);
             assert!(surfels.iter().all(|surfel| surfel.screen() == 7), "the index stays");
             surfels.iter().map(Surfel::shows_back).collect::<Vec<bool>>()
         };
@@ -102,7 +103,7 @@ fn only_what_is_sure_is_a_back() {
         let behind = Sensors::new(&cloud(1, vec![scan(ORIGIN + 3.0 * DVec3::Z, 0..1)]));
         let mut rough = at_the_origin(&normals[..2]);
         rough.iter_mut().for_each(|surfel| surfel.curvature = 0.3);
-        behind.orient(&mut rough, &view);
+        behind.orient(&mut rough, &view, &NEVER);
         let found = [&rough[0], &rough[1]].map(Surfel::shows_back);
         assert_eq!(found, [true, false], "what is thick has a side only straight on");
     }
@@ -135,7 +136,7 @@ fn the_device_marks_what_the_host_marks() {
                 surfel.normal = (normal * normal.dot(to_eye).signum()).to_array();
             }
             let device = on_device(&gpu, &passes, &sensors, &surfels, &view);
-            sensors.orient(&mut surfels, &view);
+            sensors.orient(&mut surfels, &view, &NEVER);
             compared += surfels.len();
             backs += surfels.iter().filter(|surfel| surfel.shows_back()).count();
             different += surfels.iter().zip(&device).filter(|(host, device)| host != device).count();

@@ -1,7 +1,7 @@
 //! The kd-tree on the GPU: passes that build the tree level by level, then search it.
 
 use crate::Error;
-use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, Step, constants, files, indices, passes};
+use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, LARGE_GROUP, Library, Pass, Step, constants, files, indices, passes};
 use crate::project::Chunk;
 use crate::project::gpu::{Counter, Round};
 use crate::search::engine::{EnginePasses, EngineSteps, SearchBuffers};
@@ -186,7 +186,7 @@ impl KdTreePasses {
             ]
         };
         let two_levels: Vec<Step> = (0..2).flat_map(level).collect();
-        let mut steps = vec![self.begin.step(gpu, &begin, tree.capacity.div_ceil(256))];
+        let mut steps = vec![self.begin.step(gpu, &begin, tree.capacity.div_ceil(LARGE_GROUP))];
         for _ in 0..levels(tree.capacity as usize) / 2 {
             steps.extend(two_levels.iter().cloned());
         }

@@ -92,7 +92,7 @@ fn find(own: u32) -> Found {
     return Found(sums, walk.seen >= MAX_WALK_VISITS);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn moments(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         let active_points = atomicLoad(&counters[ACTIVE]);
@@ -102,7 +102,7 @@ fn moments(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         atomicStore(&bounded, 0u);
     }
     workgroupBarrier();
-    let index = group_index(workgroup) * 64u + local;
+    let index = group_index(workgroup) * SMALL_GROUP + local;
     if index < task.len {
         let found = find(source[queries[task.first + index]]);
         neighborhoods[task.first + index] = found.sums;

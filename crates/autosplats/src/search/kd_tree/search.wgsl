@@ -21,9 +21,9 @@ const N_ITER = 2u;
 // For the rounding of a distance and of its bin.
 const ROUNDING = 1.000001;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let at = group_index(workgroup) * 64u + local;
+    let at = group_index(workgroup) * SMALL_GROUP + local;
     if at >= state.finite {
         return;
     }

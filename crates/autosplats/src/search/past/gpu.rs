@@ -1,7 +1,7 @@
 //! The k-radii of the last frame on the GPU.
 
 use crate::Error;
-use crate::gpu::{Gpu, Library, Pass, Step, passes};
+use crate::gpu::{Gpu, LARGE_GROUP, Library, Pass, Step, passes};
 use crate::project::gpu::{Counter, ScreenBuffers, Work};
 
 /// Imports and constants of the passes.
@@ -49,7 +49,7 @@ impl PastPasses {
         let ScreenBuffers { size: [width, height], counters, points, queries, .. } = screen;
         let keep = [frame, counters, points, queries, neighborhoods, past];
         [
-            self.clear.step(gpu, &[frame, past], (width * height).div_ceil(256)),
+            self.clear.step(gpu, &[frame, past], (width * height).div_ceil(LARGE_GROUP)),
             self.keep.step(gpu, &keep, screen.groups(Work::Queries256)),
         ]
     }

@@ -13,9 +13,9 @@
 @group(0) @binding(4) var<storage, read> neighborhoods: array<Neighborhood>;
 @group(0) @binding(5) var<storage, read_write> past: array<atomic<u32>>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn keep_past(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= counters[ACTIVE] + counters[RECOVERED] || neighborhoods[index].count < f32(frame.k) {
         return;
     }

@@ -255,7 +255,7 @@ fn moments(center: vec3f, squared: f32) -> Neighborhood {
     return sums;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         task_load();
@@ -263,7 +263,7 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         atomicStore(&bounded, 0u);
     }
     workgroupBarrier();
-    let place = group_index(workgroup) * 64u + local;
+    let place = group_index(workgroup) * SMALL_GROUP + local;
     if place < select(task.len, task.left, LEFT_ONLY) {
         var index = place;
         if LEFT_ONLY {

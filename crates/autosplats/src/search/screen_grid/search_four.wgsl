@@ -306,14 +306,14 @@ fn sum_moments(four: Four, found: vec4f, first: u32) {
     }
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn search_four(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         task_load();
         atomicStore(&left_len, 0u);
     }
     workgroupBarrier();
-    let first = 4u * (group_index(workgroup) * 64u + local);
+    let first = 4u * (group_index(workgroup) * SMALL_GROUP + local);
     let indices = vec4u(first, first + 1u, first + 2u, first + 3u);
     let valid = indices < vec4u(task.len);
     var found = vec4f(MAX_F32);

@@ -20,7 +20,7 @@ fn begin() {
     arguments.boxes = Draw(BOX_VERTICES * counters[VISIBLE], has_work, 0u, 0u);
     arguments.last_clear = arguments.clear;
     arguments.last_boxes = arguments.boxes;
-    let groups = (queries + 255u) / 256u;
+    let groups = (queries + LARGE_GROUP - 1u) / LARGE_GROUP;
     arguments.count = vec3u(min(groups, GROUPS_PER_ROW), (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW, 1u);
     arguments.iterations = 0u;
     // Unconverged queries of each round, before the first iteration and after each.

@@ -22,7 +22,7 @@
 
 var<workgroup> unconverged: atomic<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
         atomicStore(&unconverged, 0u);
@@ -30,7 +30,7 @@ fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     workgroupBarrier();
     let first = select(0u, counters[ACTIVE], ROUND == 1u);
     let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index < len {
         let pixel = pixel_xy(points[queries[first + index]].pixel);
         let known = recall(textureLoad(radii, pixel, 0), textureLoad(counts, pixel, 0));

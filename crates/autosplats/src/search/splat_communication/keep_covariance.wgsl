@@ -15,11 +15,11 @@
 @group(0) @binding(5) var first_products: texture_2d<f32>;
 @group(0) @binding(6) var last_products: texture_2d<f32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn keep_covariance(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let first = select(0u, counters[ACTIVE], ROUND == 1u);
     let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= len {
         return;
     }

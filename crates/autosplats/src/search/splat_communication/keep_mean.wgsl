@@ -17,12 +17,12 @@
 @group(0) @binding(6) var sums: texture_2d<f32>;
 @group(0) @binding(7) var furthest: texture_2d<f32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn keep_mean(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let active_points = atomicLoad(&counters[ACTIVE]);
     let first = select(0u, active_points, ROUND == 1u);
     let len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= len {
         return;
     }

@@ -41,12 +41,14 @@ pub(crate) fn finish(
         .map(|bytes| bytemuck::pod_read_unaligned(&bytes[..size_of::<[f32; 3]>()]))
         .collect_into_vec(&mut image.linear);
     let map = shading.color.usual_map()?;
-    let range = scene.given_range(shading).unwrap_or_else(|| read.range.map(f32::from_bits));
+    let range = scene
+        .given_range(shading)
+        .unwrap_or_else(|| scene.range_above_noise(&shading.color, read.range.map(f32::from_bits)));
     if shading.legend {
         let scale = Scale::new(shading.color_map.unwrap_or(map), range);
         let table = encode_table();
-        let offset = scene.value_offset(&shading.color);
-        legend::draw(image, shading, &scale, offset, |channel| encode(table, channel));
+        let world = |range| scene.world_range(&shading.color, range);
+        legend::draw(image, shading, &scale, world, |channel| encode(table, channel));
     }
     Some(scene.world_range(&shading.color, range))
 }

@@ -2,8 +2,8 @@
 
 use std::cell::RefCell;
 
-use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::{PointCloud, ValueOrigin};
 
 use super::super::cpu::{Scene, Shader, shade};
 use super::super::{Background, Backs, ColorMap, ColorMode, Image, Shading};
@@ -210,7 +210,14 @@ fn every_setting_makes_the_same_picture() {
     for size in [[1, 1], [3, 200], [97, 61], [256, 64], [300, 190]] {
         for projection in PROJECTIONS {
             let view = view(size, projection, DVec3::ZERO);
-            let scene = Scene { view: &view, up: DVec3::new(0.6, 0.0, 0.8), origin: DVec3::ZERO, exposure: 1.7 };
+            let scene = Scene {
+                view: &view,
+                up: DVec3::new(0.6, 0.0, 0.8),
+                origin: DVec3::ZERO,
+                unit: 1.0,
+                exposure: 1.7,
+                values: ValueOrigin::default(),
+            };
             for layers in [blocks(5, size), colored(6, size), with_backs(blocks(5, size)), with_backs(colored(6, size))]
             {
                 for color in modes() {
@@ -252,7 +259,14 @@ fn pictures_of_clouds_are_the_same() {
             let settings = Settings { all_layers: true, ..Settings::default() };
             let layers = renderer.render(&cloud, &camera, size, &settings).expect("a frame").layers.clone();
             let view = camera.view(DVec3::ZERO, size).expect("a view");
-            let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure: 1.0 };
+            let scene = Scene {
+                view: &view,
+                up: DVec3::Y,
+                origin: DVec3::ZERO,
+                unit: 1.0,
+                exposure: 1.0,
+                values: ValueOrigin::default(),
+            };
             for color in modes() {
                 if matches!(color, ColorMode::Field(_)) {
                     continue;
@@ -271,7 +285,14 @@ fn a_difference_is_found() {
     let Some(device) = Device::new() else { return };
     let size = [64, 40];
     let view = view(size, PROJECTIONS[0], DVec3::ZERO);
-    let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure: 1.0 };
+    let scene = Scene {
+        view: &view,
+        up: DVec3::Y,
+        origin: DVec3::ZERO,
+        unit: 1.0,
+        exposure: 1.0,
+        values: ValueOrigin::default(),
+    };
     let layers = blocks(1, size);
     let host = on_host(&layers, &scene, &Shading::default(), true);
     let other = Shading { occlusion: 2.0, ..Shading::default() };
@@ -291,7 +312,14 @@ fn backs_are_toned_whatever_else_splats_carry() {
     let Some(device) = Device::new() else { return };
     let size = [97, 61];
     let view = view(size, PROJECTIONS[0], DVec3::ZERO);
-    let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure: 1.0 };
+    let scene = Scene {
+        view: &view,
+        up: DVec3::Y,
+        origin: DVec3::ZERO,
+        unit: 1.0,
+        exposure: 1.0,
+        values: ValueOrigin::default(),
+    };
     for layers in [blocks(7, size), colored(8, size)].map(with_backs).map(without_measures) {
         let shading = Shading::default();
         let host = on_host(&layers, &scene, &shading, true);
@@ -306,7 +334,14 @@ fn ranges_are_those_of_sorted_values() {
     let shading = Shading { color: ColorMode::Field("any".into()), ..Shading::default() };
     for size in [[1, 1], [10, 10], [199, 1], [64, 65], [250, 200], [251, 200], [410, 300]] {
         let view = view(size, PROJECTIONS[0], DVec3::ZERO);
-        let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure: 1.0 };
+        let scene = Scene {
+            view: &view,
+            up: DVec3::Y,
+            origin: DVec3::ZERO,
+            unit: 1.0,
+            exposure: 1.0,
+            values: ValueOrigin::default(),
+        };
         for values in 0..7 {
             let mut layers = layers_of(size);
             layers.depth.fill(1.0);
@@ -328,7 +363,7 @@ fn ranges_are_those_of_sorted_values() {
                 }
             }
             let shader = Shader::new(&layers, &scene, &shading);
-            let host = shader.scale.as_ref().expect("a value").range();
+            let host = shader.usual_range();
             let found = device.shade(&layers, &scene, &shading, false).range;
             assert_eq!(found, host.map(f32::to_bits), "{size:?}, values {values}: {host:?}");
         }
@@ -342,8 +377,9 @@ fn heights_are_told_apart_in_survey_coordinates() {
     let layers = blocks(9, size);
     let pictures = [DVec3::ZERO, DVec3::new(406_123.25, 5_100_211.5, 5_000_350.75)].map(|origin| {
         let view = view(size, PROJECTIONS[0], origin);
-        let scene = Scene { view: &view, up: DVec3::Z, origin, exposure: 1.0 };
-        let ranges = [None, Some([-1.0, 1.0].map(|end| (origin.z + end) as f32))];
+        let scene =
+            Scene { view: &view, up: DVec3::Z, origin, unit: 1.0, exposure: 1.0, values: ValueOrigin::default() };
+        let ranges = [None, Some([-1.0, 1.0].map(|end| origin.z + end))];
         ranges.map(|range| {
             let shading = Shading { color: ColorMode::Height, range, ..Shading::default() };
             for legend in [false, true] {
@@ -365,7 +401,14 @@ fn textures_get_the_picture() {
     let gpu = &device.gpu;
     let size = [97, 33];
     let view = view(size, PROJECTIONS[0], DVec3::ZERO);
-    let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure: 1.0 };
+    let scene = Scene {
+        view: &view,
+        up: DVec3::Y,
+        origin: DVec3::ZERO,
+        unit: 1.0,
+        exposure: 1.0,
+        values: ValueOrigin::default(),
+    };
     let (layers, shading) = (colored(2, size), Shading::default());
     let texture = |format, [width, height]: [u32; 2], usage| {
         gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -420,7 +463,14 @@ fn tables_follow_the_settings() {
     let gpu = &device.gpu;
     let size = [70, 20];
     let view = view(size, PROJECTIONS[0], DVec3::ZERO);
-    let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure: 1.0 };
+    let scene = Scene {
+        view: &view,
+        up: DVec3::Y,
+        origin: DVec3::ZERO,
+        unit: 1.0,
+        exposure: 1.0,
+        values: ValueOrigin::default(),
+    };
     let host = blocks(4, size);
     let layers = upload_layers(gpu, &host);
     let mut buffers = ShadeBuffers::new(gpu, size, false).expect("room");

@@ -61,7 +61,7 @@ pub(crate) struct ShadeUniform {
     pub(crate) samples: u32,
     pub(crate) backgrounds: u32,
     pub(crate) measures: u32,
-    pub(crate) padding: u32,
+    pub(crate) value_noise: f32,
     pub(crate) pairs: [ShadePair; PAIR_COUNT],
 }
 
@@ -103,7 +103,7 @@ impl ShadeUniform {
             samples: pixels.div_ceil(step) as u32,
             backgrounds: encode_words() as u32,
             measures: if layers.channels.color { layers.size.iter().product() } else { 0 },
-            padding: 0,
+            value_noise: scene.value_noise(&shading.color),
             pairs: pairs(height).map(|Pair { step, inverse_px, part }| {
                 let step = step.map(|side| side as f32);
                 ShadePair { step, inverse_px, part }

@@ -29,7 +29,8 @@ struct ShadeUniform {
     backgrounds: u32,
     // Start of the measures in `extras`.
     measures: u32,
-    padding: u32,
+    // Least width of a range that is found, beside RANGE_NOISE.
+    value_noise: f32,
     // Pairs of pixels for occlusion.
     pairs: array<ShadePair, PAIR_COUNT>,
 }

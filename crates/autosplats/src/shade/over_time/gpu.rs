@@ -3,7 +3,7 @@
 
 use super::{MAX_SAME_DEPTH_PX, MIN_SEEN_WEIGHT, PAST_SHARE};
 use crate::Error;
-use crate::gpu::{Gpu, Library, Pass, Step, constants, passes};
+use crate::gpu::{Gpu, LARGE_GROUP, Library, Pass, Step, constants, passes};
 use crate::shade::encode::ENCODE_STEPS;
 use crate::shade::gpu::{self, ROW_PIXELS, ShadeBuffers};
 use crate::splat::LayerBuffers;
@@ -19,9 +19,6 @@ passes! {
     OVER_TIME = "over_time",
     KEEP_PICTURE = "keep_picture",
 }
-
-/// Invocations in a workgroup.
-const GROUP: u32 = 256;
 
 /// State that the last picture leaves for the next one.
 #[derive(Debug)]
@@ -72,7 +69,7 @@ impl PictureOverTimePasses {
         picture: &ShadeBuffers,
         last: &LastPictureBuffers,
     ) -> [Step; 2] {
-        let groups = (picture.size[0] * picture.size[1]).div_ceil(GROUP);
+        let groups = (picture.size[0] * picture.size[1]).div_ceil(LARGE_GROUP);
         let LastPictureBuffers { depths, image } = last;
         [
             self.average.step(gpu, &[frame, &layers.surface, depths, image, &picture.tables, &picture.image], groups),

@@ -12,10 +12,10 @@
 @group(0) @binding(3) var<storage, read_write> past_depths: array<f32>;
 @group(0) @binding(4) var<storage, read_write> past_image: array<u32>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn keep_picture(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let width = frame.picture.x;
-    let at = group_index(workgroup) * 256u + local;
+    let at = group_index(workgroup) * LARGE_GROUP + local;
     let pixel = divide(at, width).yx;
     if pixel.y >= frame.picture.y {
         return;

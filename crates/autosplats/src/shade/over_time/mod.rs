@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 use super::{Image, linear_steps};
 use crate::camera::{PlacedView, Reprojection, View};
+use crate::cancel::Cancel;
 use crate::shade::encode::{encode, encode_table};
 use crate::splat::GBuffer;
 
@@ -88,20 +89,21 @@ impl<M: PartialEq> LastPicture<M> {
 
 impl PictureInProgress<'_> {
     /// Averages a picture with the last one, and keeps it for the next.
-    pub(crate) fn average(&mut self, layers: &GBuffer, image: &mut Image) {
+    pub(crate) fn average(&mut self, layers: &GBuffer, image: &mut Image, cancel: &Cancel<'_>) {
         let Self { last, view, past } = self;
         if let Some(past) = past {
-            last.mix_into(image, layers, view, past);
+            last.mix_into(image, layers, view, past, cancel);
         }
-        last.keep(layers, image);
+        last.keep(layers, image, cancel);
     }
 }
 
 impl KeptPicture {
-    fn mix_into(&self, image: &mut Image, layers: &GBuffer, view: &View, past: &Reprojection) {
+    fn mix_into(&self, image: &mut Image, layers: &GBuffer, view: &View, past: &Reprojection, cancel: &Cancel<'_>) {
         let (steps, table) = (linear_steps(), encode_table());
         let width = image.width as usize;
-        image.pixels.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        let rows = image.pixels.par_chunks_mut(width).enumerate();
+        rows.filter(|_| !cancel.is_given_up()).for_each(|(y, row)| {
             for (x, pixel) in row.iter_mut().enumerate() {
                 let index = layers.index(x, y);
                 if !(layers.weight[index] > 0.0) {
@@ -146,11 +148,12 @@ impl KeptPicture {
         (all >= MIN_SEEN_WEIGHT).then(|| sum.map(|channel| channel / all))
     }
 
-    fn keep(&mut self, layers: &GBuffer, image: &Image) {
+    fn keep(&mut self, layers: &GBuffer, image: &Image, cancel: &Cancel<'_>) {
         let width = image.width as usize;
         self.pixels.clone_from(&image.pixels);
         self.depths.resize(image.pixels.len(), 0.0);
-        self.depths.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        let rows = self.depths.par_chunks_mut(width).enumerate();
+        rows.filter(|_| !cancel.is_given_up()).for_each(|(y, row)| {
             let mut x = 0;
             while x < width {
                 let run = layers.run(x).min(width - x);

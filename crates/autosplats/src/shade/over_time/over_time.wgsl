@@ -21,10 +21,10 @@ fn linear_of(rgba: u32) -> vec3f {
     return from_srgb(unpack4x8unorm(rgba).xyz);
 }
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn over_time(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let width = frame.picture.x;
-    let pixel = divide(group_index(workgroup) * 256u + local, width).yx;
+    let pixel = divide(group_index(workgroup) * LARGE_GROUP + local, width).yx;
     if pixel.y >= frame.picture.y || frame.same_picture == 0u || !has_past() {
         return;
     }

@@ -39,7 +39,7 @@ fn show(last: &mut LastPicture<u32>, (layers, color): (&GBuffer, [u8; 4]), seen:
     let pixels = vec![color; (SIZE[0] * SIZE[1]) as usize];
     let mut image = Image { width: SIZE[0], height: SIZE[1], pixels, linear: Vec::new() };
     last.begin(seen, 1, &settings);
-    last.following(seen.view).average(layers, &mut image);
+    last.following(seen.view).average(layers, &mut image, &crate::cancel::NEVER);
     last.end(seen, 1, settings);
     image
 }

@@ -2,7 +2,7 @@
 
 use std::array::from_fn;
 
-use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::{ValueOrigin, glam::DVec3};
 use autosplats_scenes::Scene as ExactScene;
 use rayon::prelude::*;
 
@@ -99,7 +99,14 @@ fn measure(name: &str, size: [u32; 2]) -> [Quality; 2] {
         let mut image = Image::default();
         shade(
             layers,
-            &Scene { view: &view, up: DVec3::Z, origin: DVec3::ZERO, exposure: 1.0 },
+            &Scene {
+                view: &view,
+                up: DVec3::Z,
+                origin: DVec3::ZERO,
+                unit: 1.0,
+                exposure: 1.0,
+                values: ValueOrigin::default(),
+            },
             &shading,
             true,
             None,

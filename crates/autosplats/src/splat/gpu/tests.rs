@@ -1,6 +1,6 @@
 //! Splatting on the GPU against the CPU, from the same surfels.
 
-use autosplats_cloud::FieldValues;
+use autosplats_cloud::{FieldValues, RelativeValues};
 use glam::Vec3;
 
 use super::super::tests::{ALL_DISCS, Data, Discs, sixteenths, surfels, views};
@@ -114,7 +114,7 @@ impl Scene<'_> {
         let color = PointColors { srgb: &data.colors, linear: &data.linear };
         let attributes = Attributes {
             color: channels.color.then_some(color),
-            scalar: channels.scalar.then_some(&scalars),
+            scalar: channels.scalar.then(|| RelativeValues::new(&scalars)),
             measures: channels.measures,
             backs: channels.backs,
         };

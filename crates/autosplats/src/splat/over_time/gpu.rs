@@ -5,7 +5,7 @@ use super::points::Fitted;
 use super::surfaces::{MAX_SURFACE_DISTANCE_RADII, MIN_SURFACE_COSINE};
 use crate::Error;
 use crate::fit::Surfel;
-use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
+use crate::gpu::{Gpu, LARGE_GROUP, Library, Pass, Step, constants, files, passes};
 use crate::project::gpu::{Counter, Round, ScreenBuffers, Work};
 use crate::splat::LayerBuffers;
 use crate::splat::gpu::CLEAR_WORDS;
@@ -103,7 +103,7 @@ impl OverTimePasses {
         let ScreenBuffers { size: [width, height], counters, points, .. } = screen;
         let OverTimeBuffers { halves, fitted, frames } = buffers;
         [
-            self.clear.step(gpu, &[frame, halves], (2 * width * height).div_ceil(256)),
+            self.clear.step(gpu, &[frame, halves], (2 * width * height).div_ceil(LARGE_GROUP)),
             self.keep.step(
                 gpu,
                 &[frame, counters, points, surfels, frames, fitted, halves],

@@ -16,9 +16,9 @@
 @group(0) @binding(5) var<storage, read_write> fitted: array<Fitted>;
 @group(0) @binding(6) var<storage, read_write> halves: array<atomic<u32>>;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn keep_fitted(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = group_index(workgroup) * 256u + local;
+    let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= counters[ACTIVE] + counters[RECOVERED] {
         return;
     }

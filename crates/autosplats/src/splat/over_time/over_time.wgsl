@@ -87,11 +87,11 @@ fn smoothed(place: u32) -> f32 {
     return frame.frames_averaged;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn over_time(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let first = select(0u, counters[ACTIVE], ROUND == 1u);
     let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
-    let index = group_index(workgroup) * 64u + local;
+    let index = group_index(workgroup) * SMALL_GROUP + local;
     if index < len {
         frames[first + index] = smoothed(first + index);
     }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::surfaces::{MIN_SURFACE_COSINE, draw_to, draw_towards, seen_before};
 use crate::camera::{PlacedView, Reprojection, View};
+use crate::cancel::Cancel;
 use crate::fit::{Surfel, Surfels};
 use crate::project::{ScreenPoints, half_at};
 use crate::splat::GBuffer;
@@ -81,14 +82,21 @@ impl<M: PartialEq> OverTime<M> {
 
     /// Averages `surfels`, which follow those of earlier calls in this frame, with the last frame. `last` is the
     /// surface that the last frame showed.
-    pub(crate) fn smooth(&mut self, surfels: &mut [Surfel], screen: &ScreenPoints, last: &GBuffer, view: &View) {
+    pub(crate) fn smooth(
+        &mut self,
+        surfels: &mut [Surfel],
+        screen: &ScreenPoints,
+        last: &GBuffer,
+        view: &View,
+        cancel: &Cancel<'_>,
+    ) {
         let first = self.frames.len();
         self.frames.resize(first + surfels.len(), 1.0);
         let Some(past) = self.past.filter(|past| past.frames > 1.0) else { return };
         let Self { halves, fitted, frames, .. } = self;
         let known = LastFrame { past: &past, halves, fitted, last, screen };
         let tasks = surfels.par_chunks_mut(TASK).zip(frames[first..].par_chunks_mut(TASK));
-        tasks.for_each(|(surfels, frames)| {
+        tasks.filter(|_| !cancel.is_given_up()).for_each(|(surfels, frames)| {
             for (surfel, frames) in surfels.iter_mut().zip(frames) {
                 *frames = known.smooth(surfel, view);
             }
@@ -96,14 +104,14 @@ impl<M: PartialEq> OverTime<M> {
     }
 
     /// Keeps the fits of this frame; `surfels` are all of its surfels.
-    pub(crate) fn keep(&mut self, surfels: &Surfels, screen: &ScreenPoints, view: &View) {
+    pub(crate) fn keep(&mut self, surfels: &Surfels, screen: &ScreenPoints, view: &View, cancel: &Cancel<'_>) {
         let Self { halves, fitted, frames, .. } = self;
         halves.resize_with(2 * view.width as usize * view.height as usize, AtomicU32::default);
         halves.par_chunks_mut(TASK).for_each(|halves| halves.iter_mut().for_each(|half| *half.get_mut() = 0));
         fitted.resize(surfels.len(), Fitted::default());
         let halves = &*halves;
         let tasks = fitted.par_chunks_mut(TASK).zip(surfels.par_chunks(TASK)).zip(frames.par_chunks(TASK));
-        tasks.enumerate().for_each(|(task, ((fitted, surfels), frames))| {
+        tasks.enumerate().filter(|_| !cancel.is_given_up()).for_each(|(task, ((fitted, surfels), frames))| {
             for (index, ((fitted, surfel), &frames)) in fitted.iter_mut().zip(surfels).zip(frames).enumerate() {
                 let point = point_of(surfel, screen);
                 let offset = (Vec3::from(surfel.center) - point).to_array();

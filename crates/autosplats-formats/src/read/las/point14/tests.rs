@@ -21,7 +21,7 @@ use laz::{
     },
 };
 
-use super::{super::laz::decompressor, LAYERS, LEN};
+use super::{super::decompressor::decompressor, LAYERS, LEN};
 
 /// A number of any size, small sizes as often as large ones.
 fn any_size(random: &mut Random) -> i64 {

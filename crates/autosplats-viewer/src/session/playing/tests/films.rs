@@ -68,9 +68,7 @@ fn each_picture_shows_the_frame_of_its_time() {
         let cloud = autosplats::cloud::PointCloud::clone(&cloud).with_axes(axes);
         settings.reconstruction.k = settings.reconstruction.k.min(39);
         let rendered = renderer.render(&cloud, &app.view.navigation.camera(), [48, 32], &settings).expect("a picture");
-        if let Some(range) = rendered.counts.value_range {
-            settings.shading.range.get_or_insert(range.map(|end| end as f32));
-        }
+        settings.shading.range = settings.shading.range.or_else(|| rendered.counts.range());
         assert_eq!(picture.pixels, rendered.image.pixels, "picture {number} is of frame {frame}");
     }
     assert_ne!(pictures[0].pixels, pictures[1].pixels, "the comparison can tell frames apart");

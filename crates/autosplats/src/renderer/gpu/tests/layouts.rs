@@ -125,7 +125,7 @@ fn mirrored() -> [Mirrored; 16] {
                 samples,
                 backgrounds,
                 measures,
-                padding,
+                value_noise,
                 pairs,
             }
         ),

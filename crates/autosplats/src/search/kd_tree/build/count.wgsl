@@ -13,7 +13,7 @@
 
 var<workgroup> left: atomic<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let chunk = group_index(workgroup);
     if local == 0u {
@@ -22,7 +22,7 @@ fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     workgroupBarrier();
     var own = 0u;
-    for (var at = task.first + local; at < task.end; at += 64u) {
+    for (var at = task.first + local; at < task.end; at += SMALL_GROUP) {
         own += select(0u, 1u, kd_goes_left(points[at], task.axis, task.plane));
     }
     atomicAdd(&left, own);

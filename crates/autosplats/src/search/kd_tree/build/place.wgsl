@@ -18,9 +18,9 @@
 @group(0) @binding(7) var<storage, read_write> arguments: array<Dispatch>;
 
 // Sums over runs of nodes: nodes split, large children, their chunks, small children.
-var<workgroup> made: array<vec4u, 257>;
+var<workgroup> made: array<vec4u, LARGE_GROUP + 1u>;
 // Points that go left, summed over runs of chunks.
-var<workgroup> sums: array<u32, 257>;
+var<workgroup> sums: array<u32, LARGE_GROUP + 1u>;
 
 fn points_left(own: KdLarge) -> u32 {
     let chunks = (own.len + CHUNK_POINTS - 1u) / CHUNK_POINTS;
@@ -69,10 +69,10 @@ fn put(node: u32, first: u32, len: u32, parent_len: u32, at: vec4u) -> u32 {
     return KD_NONE;
 }
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LARGE_GROUP)
 fn place(@builtin(local_invocation_index) local: u32) {
     // Replace the sums of chunks by the number of points that go left before each chunk, and after the last.
-    let chunks_each = (state.chunks + 255u) / 256u;
+    let chunks_each = (state.chunks + LARGE_GROUP - 1u) / LARGE_GROUP;
     let first_chunk = min(local * chunks_each, state.chunks);
     let end_chunk = min(first_chunk + chunks_each, state.chunks);
     var sum = 0u;
@@ -83,7 +83,7 @@ fn place(@builtin(local_invocation_index) local: u32) {
     workgroupBarrier();
     if local == 0u {
         sums[0] = 0u;
-        for (var run = 1u; run <= 256u; run++) {
+        for (var run = 1u; run <= LARGE_GROUP; run++) {
             sums[run] += sums[run - 1u];
         }
         chunk_sums[state.chunks] = sums[256];
@@ -98,7 +98,7 @@ fn place(@builtin(local_invocation_index) local: u32) {
     storageBarrier();
     workgroupBarrier();
 
-    let nodes_each = (state.large + 255u) / 256u;
+    let nodes_each = (state.large + LARGE_GROUP - 1u) / LARGE_GROUP;
     let first_node = min(local * nodes_each, state.large);
     let end_node = min(first_node + nodes_each, state.large);
     var own_made = vec4u(0u);
@@ -109,16 +109,16 @@ fn place(@builtin(local_invocation_index) local: u32) {
     workgroupBarrier();
     if local == 0u {
         made[0] = vec4u(0u);
-        for (var run = 1u; run <= 256u; run++) {
+        for (var run = 1u; run <= LARGE_GROUP; run++) {
             made[run] += made[run - 1u];
         }
         let total = made[256];
         let finite = select(state.finite, chunk_sums[state.chunks], state.level == 0u);
         next_state = KdState(state.level + 1u, state.nodes + 2u * total.x, total.y, total.z, state.small + total.w, finite);
-        put_work(WORK_LARGE, total.y, 64u);
+        put_work(WORK_LARGE, total.y, SMALL_GROUP);
         put_work(WORK_CHUNKS, total.z, 1u);
         put_work(WORK_SMALL, state.small + total.w, 1u);
-        put_work(WORK_POINTS, finite, 64u);
+        put_work(WORK_POINTS, finite, SMALL_GROUP);
     }
     workgroupBarrier();
     var so_far = made[local];

@@ -18,15 +18,15 @@
 // Bits of the chunk's points that go left.
 var<workgroup> bits: array<atomic<u32>, 8>;
 // Boxes of the points that each invocation moves left and right: least and negated greatest coordinates.
-var<workgroup> boxes: array<f32, 768>;
+var<workgroup> boxes: array<f32, 12u * SMALL_GROUP>;
 
 fn bound(place: u32, local: u32, value: vec3f) {
-    boxes[place * 64u + local] = value.x;
-    boxes[(place + 1u) * 64u + local] = value.y;
-    boxes[(place + 2u) * 64u + local] = value.z;
+    boxes[place * SMALL_GROUP + local] = value.x;
+    boxes[(place + 1u) * SMALL_GROUP + local] = value.y;
+    boxes[(place + 2u) * SMALL_GROUP + local] = value.z;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let chunk = group_index(workgroup);
     if local == 0u {
@@ -36,7 +36,7 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         atomicStore(&bits[local], 0u);
     }
     workgroupBarrier();
-    for (var flag = local; task.first + flag < task.end; flag += 64u) {
+    for (var flag = local; task.first + flag < task.end; flag += SMALL_GROUP) {
         if kd_goes_left(points[task.first + flag], task.axis, task.plane) {
             atomicOr(&bits[flag / 32u], 1u << (flag % 32u));
         }
@@ -48,7 +48,7 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     var left_high = vec3f(MAX_F32);
     var right_low = vec3f(MAX_F32);
     var right_high = vec3f(MAX_F32);
-    for (var flag = local; task.first + flag < task.end; flag += 64u) {
+    for (var flag = local; task.first + flag < task.end; flag += SMALL_GROUP) {
         let at = task.first + flag;
         let point = points[at];
         if task.axis == KD_UNSPLIT {
@@ -84,8 +84,8 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         return;
     }
     var least = MAX_F32;
-    for (var invocation = 0u; invocation < 64u; invocation++) {
-        least = min(least, boxes[local * 64u + invocation]);
+    for (var invocation = 0u; invocation < SMALL_GROUP; invocation++) {
+        least = min(least, boxes[local * SMALL_GROUP + invocation]);
     }
     let axis = local % 3u;
     let words = slot * KD_LARGE_WORDS;

@@ -45,9 +45,9 @@ fn sampled_median(large_node: KdLarge, axis: u32) -> f32 {
     return median;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SMALL_GROUP)
 fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let at = group_index(workgroup) * 64u + local;
+    let at = group_index(workgroup) * SMALL_GROUP + local;
     if at >= state.large {
         return;
     }
