@@ -71,7 +71,10 @@ pub(super) const KINDS: &[Kind] = &[
         outcome: "that scan is left out, or stands unmoved; told by its name",
     },
     Kind { fault: "LAZ without a usable chunk table", outcome: "chunks are found one after the other, told" },
-    Kind { fault: "LAS whose count is 0, or smaller than what is there", outcome: "with a count of 0 all whole records are read, else the stated number; told" },
+    Kind {
+        fault: "LAS whose count is 0, or smaller than what is there",
+        outcome: "with a count of 0 all whole records are read, else the stated number; told",
+    },
     Kind {
         fault: "thousands separators, decimal commas, quoted values",
         outcome: "the notation of all numbers decides; ambiguous ones are refused",

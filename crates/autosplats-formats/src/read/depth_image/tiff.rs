@@ -23,6 +23,9 @@ const MAP_TAGS: [Tag; 4] =
 /// A sample format of whole numbers without a sign, the default.
 const UNSIGNED: u16 = 1;
 
+/// Largest strip or tile, in bytes, that any file may have: four times the usual one, of doubles.
+const MAX_TILE: usize = 512 * 512 * 8;
+
 /// Header of a TIFF.
 pub(super) struct Header {
     pub(super) width: usize,
@@ -47,9 +50,11 @@ impl Header {
             let is_map = MAP_TAGS.into_iter().any(|tag| matches!(decoder.find_tag(tag), Ok(Some(_))));
             let format = decoder.find_tag_unsigned_vec::<u16>(Tag::SampleFormat).map_err(told)?;
             let format = format.and_then(|formats| formats.first().copied()).unwrap_or(UNSIGNED);
-            Ok((decoder.dimensions().map_err(told)?, decoder.colortype().map_err(told)?, format, is_map))
+            let color = decoder.colortype().map_err(told)?;
+            Ok((decoder.dimensions().map_err(told)?, decoder.chunk_dimensions(), color, format, is_map))
         };
-        let ((width, height), color, format, is_map) = guard(read).map_err(|what: String| damaged(job, &what))?;
+        let ((width, height), chunk, color, format, is_map) =
+            guard(read).map_err(|what: String| damaged(job, &what))?;
         if is_map {
             let what = "a GeoTIFF, a map rather than a depth image; 'gdal_translate -of AAIGrid in.tif out.asc' makes a grid \
                         of heights that is read";
@@ -61,8 +66,11 @@ impl Header {
             _ => return Err(super::no_depth(job, "TIFF of several channels")),
         };
         let (width, height) = (width as usize, height as usize);
-        let bytes = width.saturating_mul(height).saturating_mul(usize::from(bits / 8));
-        if bytes == 0 || bytes / MAX_EXPANSION > job.bytes.len() {
+        let size = |width: usize, height: usize| width.saturating_mul(height).saturating_mul(usize::from(bits / 8));
+        let bytes = size(width, height);
+        // Memory for a strip or tile is taken as its size claims, which tiles of ordinary size may exceed a little.
+        let tile = size(chunk.0 as usize, chunk.1 as usize).saturating_sub(MAX_TILE);
+        if bytes == 0 || bytes.max(tile) / MAX_EXPANSION > job.bytes.len() {
             let what = format!("{width} × {height} pixels cannot be in {} bytes", job.bytes.len());
             return Err(damaged(job, &what));
         }
