@@ -35,7 +35,33 @@ pub(super) struct Header {
 }
 
 fn open<'a>(job: &Job<'a>) -> Result<Decoder<Cursor<&'a [u8]>>, String> {
+    if values_fit(job.bytes) == Some(false) {
+        return Err("an entry of the directory has more values than the file has bytes".into());
+    }
     guard(|| Decoder::new(Cursor::new(job.bytes)).map_err(|error| error.to_string()))
+}
+
+/// Whether no entry of the directory claims more values than the file has bytes; `None` if the directory is cut off. The
+/// decoder takes memory for them before its limits can be set.
+fn values_fit(bytes: &[u8]) -> Option<bool> {
+    let little = bytes.starts_with(b"II");
+    let number = |at: usize, len: usize| {
+        let raw = bytes.get(at..at.checked_add(len)?)?;
+        let digits: &mut dyn Iterator<Item = &u8> = if little { &mut raw.iter().rev() } else { &mut raw.iter() };
+        usize::try_from(digits.fold(0_u64, |sum, &byte| sum << 8 | u64::from(byte))).ok()
+    };
+    let big = number(2, 2)? == 43;
+    let (word, entry) = if big { (8, 20) } else { (4, 12) };
+    let directory = number(word, word)?;
+    let count_len = if big { 8 } else { 2 };
+    let first = directory.checked_add(count_len)?;
+    let entries = number(directory, count_len)?.min(bytes.len() / entry);
+    for index in 0..entries {
+        if number(first.checked_add(index * entry + 4)?, word)? > bytes.len() {
+            return Some(false);
+        }
+    }
+    Some(true)
 }
 
 fn damaged(job: &Job<'_>, what: &str) -> Error {

@@ -159,7 +159,7 @@ impl Naming {
             }
         }
         // Three columns leave nothing to guess, and PTS defines its columns.
-        let defined = width == 3 || pts && (width == 4 || width == 7 && guess[4] == "red");
+        let defined = width == 3 || pts && (width == 4 || width == 7 && guess.get(4).is_some_and(|name| name == "red"));
         match header {
             Some(_) => notes.insert(0, format!("the header names no x, y and z; {}", columns::taken_for(&names))),
             None if defined => {}
