@@ -41,8 +41,8 @@ fn open<'a>(job: &Job<'a>) -> Result<Decoder<Cursor<&'a [u8]>>, String> {
     guard(|| Decoder::new(Cursor::new(job.bytes)).map_err(|error| error.to_string()))
 }
 
-/// Whether no entry of the directory claims more values than the file has bytes; `None` if the directory is cut off. The
-/// decoder takes memory for them before its limits can be set.
+/// Whether no entry of the directory claims more values than the file has bytes; `None` if the directory is cut off.
+/// The decoder takes memory for them before its limits can be set.
 fn values_fit(bytes: &[u8]) -> Option<bool> {
     let little = bytes.starts_with(b"II");
     let number = |at: usize, len: usize| {
