@@ -1,30 +1,18 @@
 //! Texts as people have them: columns of point numbers and words, gaps, thousands, names in many languages, grids,
 //! byte order marks, compression. The files lie beside the shared data, in `field`; siblings are made here.
 
-use std::{io::Write as _, path::Path, sync::Mutex};
+use std::{io::Write as _, path::Path};
 
-use crate::common::shared_data;
-use autosplats_cloud::{Axes, Error, PointCloud, Progress, Unit, glam::DVec3};
+use crate::common::{las_files::Notes, shared_data};
+use autosplats_cloud::{Axes, Error, PointCloud, Unit, glam::DVec3};
 use autosplats_formats::{ReadOptions, describe_bytes, read_bytes};
-
-/// Keeps notes.
-#[derive(Default)]
-struct Ear(Mutex<Vec<String>>);
-
-impl Progress for Ear {
-    fn report(&self, _fraction: f32) {}
-
-    fn note(&self, note: &str) {
-        self.0.lock().unwrap().push(note.into());
-    }
-}
 
 fn attempt(name: &str, bytes: &[u8], columns: Option<&str>) -> Result<(PointCloud, String), Error> {
     let columns = columns.map(|columns| columns.split(',').map(String::from).collect());
-    let ear = Ear::default();
+    let ear = Notes::default();
     let options = ReadOptions { columns, ..ReadOptions::default() };
     let cloud = read_bytes(Path::new(name), bytes, &options, &ear)?;
-    Ok((cloud, ear.0.into_inner().unwrap().join("\n")))
+    Ok((cloud, ear.notes.into_inner().unwrap().join("\n")))
 }
 
 fn noted(name: &str, bytes: impl AsRef<[u8]>) -> (PointCloud, String) {

@@ -1,16 +1,11 @@
 //! Files as people have them: widths of bare sweeps, scales of colours, odd headers, files that are cut off. Each kind
 //! has the file of the shared set and others of the same kind.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::common::{colors, las_files::Notes, pcd_bytes, positions, shared_data};
+use crate::common::{colors, field_file, las_files::Notes, pcd_bytes, positions};
 use autosplats_cloud::{Error, PointCloud, Random};
 use autosplats_formats::{ReadOptions, read_bytes, read_mesh};
-
-/// A file of the set that lies beside the shared data, if present.
-fn field_file(name: &str) -> Option<PathBuf> {
-    Some(shared_data()?.with_file_name("field").join(name)).filter(|path| path.exists())
-}
 
 fn noted(name: &str, bytes: &[u8]) -> Result<(PointCloud, String), Error> {
     let notes = Notes::default();
@@ -30,8 +25,7 @@ fn refused(name: &str, bytes: &[u8]) -> String {
 }
 
 fn load_field(name: &str) -> Option<(PointCloud, String)> {
-    let path = field_file(name)?;
-    Some(load(name, &std::fs::read(path).unwrap()))
+    Some(load(name, &field_file(name)?))
 }
 
 fn names(cloud: &PointCloud) -> Vec<&str> {
