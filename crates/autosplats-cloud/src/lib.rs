@@ -32,10 +32,12 @@ mod moved;
 mod precision;
 mod progress;
 mod random;
+mod ranges;
 mod retain;
 mod sample;
 mod scale;
 mod thin;
+mod tree;
 
 pub use axes::Axes;
 pub use classes::class_name;
@@ -58,5 +60,7 @@ pub use precision::{
 };
 pub use progress::{Part, Progress};
 pub use random::Random;
+pub use ranges::{FileRanges, MemoryRanges, Ranges, Traffic};
 pub use sample::{SurfaceSamples, sample_surface};
 pub use scale::computing_scale_of;
+pub use tree::{Key, Node, Tree, TreeInfo, Wanted};
