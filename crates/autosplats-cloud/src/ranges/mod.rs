@@ -1,6 +1,7 @@
 //! Bytes of a file, of memory or of an address, range by range.
 
 mod file;
+mod folder;
 mod memory;
 
 use std::fmt;
@@ -10,6 +11,7 @@ use std::path::Path;
 use crate::{Error, Progress};
 
 pub use file::FileRanges;
+pub use folder::{Folder, LocalFolder};
 pub use memory::MemoryRanges;
 
 /// Something of which byte ranges can be read, on many threads at once, without reading the rest.

@@ -1,0 +1,91 @@
+//! Files below one address, each read whole.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::Traffic;
+use crate::{Error, Progress, check_memory};
+
+/// Files below one address that are small enough to be read whole, on many threads at once.
+pub trait Folder: Send + Sync + fmt::Debug {
+    /// Path or address of the folder, for messages.
+    fn name(&self) -> &Path;
+
+    /// The bytes of each of the files `names`, in the order asked for, such as `ept-data/0-0-0-0.laz`. Files may be
+    /// fetched at the same time.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for a file of more than `most` bytes, [`Error::Io`], [`Error::Remote`],
+    /// [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says so.
+    fn read(&self, names: &[String], most: u64, progress: &dyn Progress) -> Result<Vec<Vec<u8>>, Error>;
+
+    /// What has been read so far.
+    fn traffic(&self) -> Traffic;
+}
+
+/// A folder of the file system.
+#[derive(Debug)]
+pub struct LocalFolder {
+    path: PathBuf,
+    requests: AtomicU64,
+    read: AtomicU64,
+}
+
+impl LocalFolder {
+    /// The folder at `path`, which is not looked at before a file is read.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self { path: path.into(), requests: AtomicU64::new(0), read: AtomicU64::new(0) }
+    }
+
+    fn one(&self, name: &str, most: u64) -> Result<Vec<u8>, Error> {
+        let path = self.path.join(name);
+        let fail = |source| Error::Io { path: path.clone(), source };
+        let size = std::fs::metadata(&path).map_err(fail)?.len();
+        if size > most {
+            return Err(Error::unsupported(&path, too_large(size, most)));
+        }
+        check_memory("a file of a tree", size)?;
+        let bytes = std::fs::read(&path).map_err(fail)?;
+        self.requests.fetch_add(1, Ordering::Relaxed);
+        self.read.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        Ok(bytes)
+    }
+}
+
+/// Message for a file that is larger than it may be.
+pub(crate) fn too_large(size: u64, most: u64) -> String {
+    format!("it has {size} bytes, more than the {most} that such a file may have")
+}
+
+impl Folder for LocalFolder {
+    fn name(&self) -> &Path {
+        &self.path
+    }
+
+    fn read(&self, names: &[String], most: u64, progress: &dyn Progress) -> Result<Vec<Vec<u8>>, Error> {
+        let one = |name: &String| if progress.cancelled() { Err(Error::Cancelled) } else { self.one(name, most) };
+        names.iter().map(one).collect()
+    }
+
+    fn traffic(&self) -> Traffic {
+        Traffic { requests: self.requests.load(Ordering::Relaxed), bytes: self.read.load(Ordering::Relaxed) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_gives_small_files() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::create_dir(folder.path().join("a")).expect("a folder in it");
+        std::fs::write(folder.path().join("a/b"), [1, 2, 3]).expect("a file");
+        let local = LocalFolder::new(folder.path());
+        assert_eq!(local.read(&["a/b".into()], 3, &()).expect("small"), [vec![1, 2, 3]]);
+        assert!(matches!(local.read(&["a/b".into()], 2, &()), Err(Error::Unsupported { .. })), "too large");
+        assert!(matches!(local.read(&["c".into()], 2, &()), Err(Error::Io { .. })), "no such file");
+        assert_eq!(local.traffic(), Traffic { requests: 1, bytes: 3 });
+    }
+}
