@@ -13,6 +13,7 @@
 //! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
+mod append;
 mod axes;
 mod classes;
 mod cloud;
