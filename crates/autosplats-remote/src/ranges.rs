@@ -1,0 +1,214 @@
+//! Ranges of a remote file.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use autosplats_cloud::{Error, Progress, Ranges, Traffic, check_memory, check_range};
+
+use crate::address::Address;
+use crate::batch;
+use crate::client::{Ask, Client, Target, announced, check_plain};
+use crate::content_range::{ContentRange, Version};
+use crate::fault::{Fault, Wait};
+use crate::kept::Kept;
+use crate::options::RemoteOptions;
+use crate::patience::Stop;
+use crate::plan::spans;
+
+/// Bytes that opening asks for.
+const HEAD: u64 = 64 << 10;
+
+/// A file at an address.
+pub(crate) struct RemoteRanges {
+    name: PathBuf,
+    file: Arc<File>,
+    version: Version,
+    /// The first bytes, or all of them.
+    head: Vec<u8>,
+    kept: Kept<(u64, u64)>,
+}
+
+#[derive(Debug)]
+struct File {
+    client: Client,
+    target: Target,
+}
+
+impl fmt::Debug for RemoteRanges {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RemoteRanges").field("name", &self.name).field("version", &self.version).finish_non_exhaustive()
+    }
+}
+
+impl RemoteRanges {
+    pub(crate) fn open(address: &str, options: &RemoteOptions, progress: &dyn Progress) -> Result<Self, Error> {
+        let target = Target::new(Address::parse(address, options)?);
+        let name = PathBuf::from(target.address.shown());
+        let file = Arc::new(File { client: Client::new(options), target });
+        let (mut opened, opening) = (None, file.clone());
+        let keep = |_, found| {
+            opened = Some(found);
+            Ok(())
+        };
+        batch::run(&file.client.gate, 1, move |_, stop| opening.first(stop), progress, keep)?;
+        let (version, head) = opened.ok_or(Error::Cancelled)?;
+        if head.len() as u64 == version.size && version.size > HEAD {
+            progress.note(&format!("its server sends no parts of files; all {} bytes were loaded", version.size));
+        }
+        Ok(Self { name, file, version, head, kept: Kept::new(options.cache) })
+    }
+
+    /// The bytes of a range that are in memory.
+    fn known(&self, range: &Range<u64>) -> Option<Vec<u8>> {
+        if range.end <= self.head.len() as u64 {
+            return Some(self.head[range.start as usize..range.end as usize].to_vec());
+        }
+        self.kept.get(&(range.start, range.end))
+    }
+}
+
+impl Ranges for RemoteRanges {
+    fn name(&self) -> &Path {
+        &self.name
+    }
+
+    fn size(&self) -> u64 {
+        self.version.size
+    }
+
+    fn read(&self, ranges: &[Range<u64>], progress: &dyn Progress) -> Result<Vec<Vec<u8>>, Error> {
+        let mut total = 0;
+        for range in ranges {
+            check_range(&self.name, range, self.version.size)?;
+            total += u128::from(range.end - range.start);
+        }
+        check_memory("parts of a file", u64::try_from(total).unwrap_or(u64::MAX))?;
+        let mut missing = Vec::new();
+        let mut read: Vec<Vec<u8>> = Vec::with_capacity(ranges.len());
+        for (at, range) in ranges.iter().enumerate() {
+            read.push(self.known(range).unwrap_or_else(|| {
+                missing.push(at);
+                vec![0; (range.end - range.start) as usize]
+            }));
+        }
+        let spans: Arc<[_]> = spans(ranges, missing.clone()).into();
+        let (jobs, file, version) = (spans.clone(), self.file.clone(), self.version.clone());
+        let job = move |at: usize, stop: &Stop| file.part(&jobs[at].part, &version, stop);
+        let deliver = |at: usize, bytes: Vec<u8>| {
+            spans[at].deliver(&bytes, ranges, &mut read);
+            Ok(())
+        };
+        batch::run(&self.file.client.gate, spans.len(), job, progress, deliver)?;
+        for at in missing {
+            self.kept.insert((ranges[at].start, ranges[at].end), &read[at]);
+        }
+        Ok(read)
+    }
+
+    fn traffic(&self) -> Traffic {
+        self.file.client.traffic()
+    }
+}
+
+impl File {
+    /// The version of the file and its first bytes.
+    fn first(&self, stop: &Stop) -> Result<(Version, Vec<u8>), Error> {
+        let mut patience = self.client.patience(&self.target, stop);
+        loop {
+            match self.try_first(stop) {
+                Ok(first) => return Ok(first),
+                Err(fault) => patience.after(fault)?,
+            }
+        }
+    }
+
+    fn try_first(&self, stop: &Stop) -> Result<(Version, Vec<u8>), Fault> {
+        let response = self.client.get(&self.target, &Ask::Part(0..HEAD, None))?;
+        check_plain(&response)?;
+        let headers = response.headers().clone();
+        let mut head = Vec::new();
+        match response.status().as_u16() {
+            206 => {
+                let sized = ContentRange::of(&headers).ok_or_else(unclear)?;
+                let wanted = sized.size.min(HEAD);
+                if sized.part.start != 0 || sized.part.end > wanted || announced(&response, wanted).is_some() {
+                    return Err(unclear());
+                }
+                if !self.client.body(response, &self.target, &mut head, wanted, stop)? {
+                    return Err(unclear());
+                }
+                Ok((Version::of(&headers, sized.size), head))
+            }
+            200 => {
+                let most = self.client.options.cache.max(HEAD);
+                let refuse = || {
+                    Fault::Final(format!(
+                        "the server sends no parts of files, and more than {most} bytes are not loaded whole; download it"
+                    ))
+                };
+                if announced(&response, most).is_some()
+                    || !self.client.body(response, &self.target, &mut head, most, stop)?
+                {
+                    return Err(refuse());
+                }
+                Ok((Version::of(&headers, head.len() as u64), head))
+            }
+            // An empty file has no first byte.
+            _ => Ok((Version::of(&headers, 0), head)),
+        }
+    }
+
+    /// The bytes of one part. What breaks off goes on where it ended.
+    fn part(&self, part: &Range<u64>, version: &Version, stop: &Stop) -> Result<Vec<u8>, Error> {
+        let len = part.end - part.start;
+        let mut bytes = Vec::with_capacity(len as usize);
+        let mut patience = self.client.patience(&self.target, stop);
+        while (bytes.len() as u64) < len {
+            let rest = part.start + bytes.len() as u64..part.end;
+            if let Err(fault) = self.try_part(&rest, version, &mut bytes, len, stop) {
+                patience.after(fault)?;
+            } else if (bytes.len() as u64) < len {
+                patience.after(Fault::Passing("the server sends less than was asked for".into(), Wait::None))?;
+            }
+        }
+        Ok(bytes)
+    }
+
+    fn try_part(
+        &self,
+        part: &Range<u64>,
+        version: &Version,
+        bytes: &mut Vec<u8>,
+        most: u64,
+        stop: &Stop,
+    ) -> Result<(), Fault> {
+        let response = self.client.get(&self.target, &Ask::Part(part.clone(), version.strong_tag()))?;
+        check_plain(&response)?;
+        let headers = response.headers();
+        match response.status().as_u16() {
+            206 => {
+                let sized = ContentRange::of(headers).ok_or_else(unclear)?;
+                if !version.same(&Version::of(headers, sized.size)) {
+                    return Err(Fault::changed());
+                }
+                if sized.part.start != part.start || sized.part.end > part.end {
+                    return Err(unclear());
+                }
+                if announced(&response, part.end - part.start).is_some() {
+                    return Err(unclear());
+                }
+                if self.client.body(response, &self.target, bytes, most, stop)? { Ok(()) } else { Err(unclear()) }
+            }
+            200 if version.same(&Version::of(headers, version.size)) => {
+                Err(Fault::last("the server sends parts of files only sometimes; download it"))
+            }
+            _ => Err(Fault::changed()),
+        }
+    }
+}
+
+fn unclear() -> Fault {
+    Fault::last("the server sends other parts than it was asked for, or does not tell which; download it")
+}
