@@ -47,6 +47,7 @@ struct Shared {
     told: bool,
     ended: AtomicBool,
     bytes: AtomicU64,
+    connections: AtomicU64,
     heads: Mutex<Vec<String>>,
     /// How often each path was asked for.
     asked: Mutex<HashMap<String, u32>>,
@@ -59,6 +60,8 @@ pub struct Counts {
     pub requests: u64,
     /// Bytes of bodies sent.
     pub bytes: u64,
+    /// Connections taken.
+    pub connections: u64,
 }
 
 impl Server {
@@ -98,7 +101,9 @@ impl Server {
 
     /// What the server did since it started.
     pub fn counts(&self) -> Counts {
-        Counts { requests: self.heads().len() as u64, bytes: self.site.0.bytes.load(Ordering::Relaxed) }
+        let load = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        let (bytes, connections) = (load(&self.site.0.bytes), load(&self.site.0.connections));
+        Counts { requests: self.heads().len() as u64, bytes, connections }
     }
 
     /// The heads of all requests, as they came.
@@ -124,6 +129,7 @@ impl Site {
             told,
             ended: AtomicBool::new(false),
             bytes: AtomicU64::new(0),
+            connections: AtomicU64::new(0),
             heads: Mutex::default(),
             asked: Mutex::default(),
         }))
@@ -134,6 +140,7 @@ impl Site {
     /// # Errors
     /// Those of the connection.
     pub fn converse(&self, stream: impl Read + Write) -> Result<()> {
+        self.0.connections.fetch_add(1, Ordering::Relaxed);
         let mut stream = BufReader::new(stream);
         loop {
             let mut head = Vec::new();

@@ -5,6 +5,9 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use autosplats_cloud::{Error, one_line};
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+use percent_encoding::percent_decode_str;
 use rusty_s3::actions::GetObject;
 use rusty_s3::{Bucket, S3Action as _, UrlStyle};
 use url::Url;
@@ -32,8 +35,13 @@ pub(crate) struct Address {
 }
 
 enum Place {
-    Web(Url),
-    Store { bucket: Mutex<Bucket>, credentials: Option<rusty_s3::Credentials>, key: String },
+    /// An address without name and password, and the header that they are sent in.
+    Web(Url, Option<String>),
+    Store {
+        bucket: Mutex<Bucket>,
+        credentials: Option<rusty_s3::Credentials>,
+        key: String,
+    },
 }
 
 impl fmt::Debug for Address {
@@ -61,11 +69,19 @@ impl Address {
     /// The address to request, signed if there are credentials.
     pub(crate) fn url(&self) -> Url {
         match &self.place {
-            Place::Web(url) => url.clone(),
+            Place::Web(url, _) => url.clone(),
             Place::Store { bucket, credentials, key } => {
                 let bucket = bucket.lock().unwrap_or_else(PoisonError::into_inner);
                 GetObject::new(&bucket, credentials.as_ref(), key).sign(SIGNED_FOR)
             }
+        }
+    }
+
+    /// The header `Authorization` of the name and password in the address.
+    pub(crate) fn authorization(&self) -> Option<&str> {
+        match &self.place {
+            Place::Web(_, authorization) => authorization.as_deref(),
+            Place::Store { .. } => None,
         }
     }
 
@@ -80,11 +96,13 @@ impl Address {
         let mut bucket = bucket.lock().unwrap_or_else(PoisonError::into_inner);
         let amazons = bucket.base_url().host_str().is_some_and(|host| host.ends_with(".amazonaws.com"));
         let plain = region.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-') && region.len() < 40;
-        if !amazons || !plain || bucket.base_url().host_str().is_some_and(|host| host.contains(region)) {
-            return false;
+        match amazon(bucket.name(), Some(region)) {
+            Ok(moved) if amazons && plain && *bucket != moved => {
+                *bucket = moved;
+                true
+            }
+            _ => false,
         }
-        let moved = amazon(bucket.name(), Some(region));
-        moved.map(|moved| *bucket = moved).is_ok()
     }
 
     /// The address of a file below the folder of this one.
@@ -95,12 +113,12 @@ impl Address {
             None => beside(&self.shown),
         };
         let place = match &self.place {
-            Place::Web(url) => {
+            Place::Web(url, authorization) => {
                 let mut url = url.clone();
                 if let Ok(mut path) = url.path_segments_mut() {
                     path.pop().extend(name.split('/'));
                 }
-                Place::Web(url)
+                Place::Web(url, authorization.clone())
             }
             Place::Store { bucket, credentials, key } => {
                 let bucket = bucket.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -119,8 +137,12 @@ impl Address {
 fn place(text: &str, options: &RemoteOptions) -> Result<Place, String> {
     let scheme = scheme_of(text).ok_or("an address begins with http://, https://, s3://, gs:// or az://")?;
     if matches!(scheme, "http" | "https") {
-        let url = Url::parse(text).map_err(|error| format!("it is no address: {error}"))?;
-        return if url.host_str().is_some() { Ok(Place::Web(url)) } else { Err("it names no host".into()) };
+        let mut url = Url::parse(text).map_err(|error| format!("it is no address: {error}"))?;
+        let authorization = basic(&url);
+        // Neither fails for an address with a host, which these are.
+        let _ = (url.set_username(""), url.set_password(None));
+        url.set_fragment(None);
+        return Ok(Place::Web(url, authorization));
     }
     let (_, rest) = text.split_once("://").unwrap_or_default();
     let form = || format!("the form is {scheme}://BUCKET/NAME");
@@ -159,6 +181,13 @@ fn place(text: &str, options: &RemoteOptions) -> Result<Place, String> {
             store(&format!("https://{account}.blob.core.windows.net"), name, key, None)
         }
     }
+}
+
+/// The header of the name and password in an address.
+fn basic(url: &Url) -> Option<String> {
+    let decoded = |text: &str| percent_decode_str(text).collect::<Vec<u8>>();
+    let both = [decoded(url.username()), decoded(url.password().unwrap_or_default())];
+    (both != [[]; 2]).then(|| format!("Basic {}", BASE64_STANDARD.encode(both.join(&b':'))))
 }
 
 /// A bucket of Amazon's.
@@ -242,6 +271,7 @@ mod tests {
             assert!(query.contains(&format!("%2F{region}%2Fs3%2Faws4_request")), "{url}");
         };
         scope("us-east-1");
+        assert!(url("s3://eu-west-1/a", &options).starts_with("https://eu-west-1.s3.us-east-1.amazonaws.com/a?"));
         assert!(!address.set_region("us-east-1") && !address.set_region("a.evil.host"), "no other region");
         assert!(address.set_region("eu-central-1"), "another region");
         scope("eu-central-1");

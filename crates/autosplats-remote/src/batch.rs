@@ -11,7 +11,7 @@ use autosplats_cloud::{Error, Progress};
 
 use crate::patience::Stop;
 
-/// Most requests at a time to one file or folder.
+/// Most requests of a client at a time.
 pub(crate) const AT_ONCE: usize = 12;
 
 /// Time between two checks for cancellation.
@@ -46,13 +46,14 @@ impl Drop for Inside<'_> {
     }
 }
 
-/// Does the jobs 0 to `jobs` on at most [`AT_ONCE`] threads and gives each result to `done`, in order of arrival. The
-/// first failure ends all.
+/// Does the jobs 0 to `jobs` for the address `shown` on at most [`AT_ONCE`] threads, and gives each result to `done` as
+/// it arrives. The first failure ends all.
 ///
 /// # Errors
 /// Those of `job` and `done`, and [`Error::Cancelled`] if `progress` says so, without waiting for what runs.
 pub(crate) fn run<T: Send + 'static>(
     gate: &Arc<Gate>,
+    shown: &str,
     jobs: usize,
     job: impl Fn(usize, &Stop) -> Result<T, Error> + Send + Sync + 'static,
     progress: &dyn Progress,
@@ -100,7 +101,7 @@ pub(crate) fn run<T: Send + 'static>(
             // There is no thread, or it ended by a panic.
             Err(RecvTimeoutError::Disconnected) => {
                 let what = "no thread is left for its requests; close other programs".to_owned();
-                return ControlFlow::Break(Err(Error::Remote { address: "network".into(), what }));
+                return ControlFlow::Break(Err(Error::Remote { address: shown.to_owned(), what }));
             }
         }
         ControlFlow::Continue(())
@@ -134,12 +135,12 @@ mod tests {
         };
         let mut squares = [0; 40];
         std::thread::scope(|scope| {
-            let other = scope.spawn(|| run(&gate, 40, job.clone(), &(), |_, _| Ok(())));
+            let other = scope.spawn(|| run(&gate, "", 40, job.clone(), &(), |_, _| Ok(())));
             let keep = |at, square| {
                 squares[at] = square;
                 Ok(())
             };
-            run(&gate, 40, job.clone(), &(), keep).expect("nothing fails");
+            run(&gate, "", 40, job.clone(), &(), keep).expect("nothing fails");
             other.join().expect("no panic").expect("nothing fails");
         });
         assert!(squares.iter().enumerate().all(|(at, square)| *square == at * at), "each result is at its place");
@@ -163,9 +164,9 @@ mod tests {
             Ok(())
         };
         let start = Instant::now();
-        let failed = run(&Arc::default(), 9, slow, &(), |_, ()| Ok(()));
+        let failed = run(&Arc::default(), "", 9, slow, &(), |_, ()| Ok(()));
         assert!(matches!(failed, Err(Error::NoSurface)), "{failed:?}");
-        let cancelled = run(&Arc::default(), 3, slow, &Soon(AtomicBool::new(false)), |_, ()| Ok(()));
+        let cancelled = run(&Arc::default(), "", 3, slow, &Soon(AtomicBool::new(false)), |_, ()| Ok(()));
         assert!(matches!(cancelled, Err(Error::Cancelled)), "{cancelled:?}");
         assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
     }

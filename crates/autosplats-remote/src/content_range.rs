@@ -1,9 +1,9 @@
-//! What an answer says of the part that it holds.
+//! What an answer says of the bytes that it holds.
 
 use std::ops::Range;
 
 use ureq::http::HeaderMap;
-use ureq::http::header::{CONTENT_LENGTH, CONTENT_RANGE, ETAG, LAST_MODIFIED};
+use ureq::http::header::{CONTENT_ENCODING, CONTENT_LENGTH, CONTENT_RANGE, ETAG, LAST_MODIFIED};
 
 /// Part of a file that an answer holds, and the size of the whole.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,6 +20,13 @@ pub(crate) fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
 /// Number of bytes that follow, if it is told.
 pub(crate) fn length(headers: &HeaderMap) -> Option<u64> {
     text(headers, CONTENT_LENGTH.as_str())?.parse().ok()
+}
+
+/// How the bytes that follow are compressed, if they are.
+pub(crate) fn compression(headers: &HeaderMap) -> Option<&str> {
+    // Some programs leave the third with what they store at Amazon, where it means nothing.
+    let plain = |name: &&str| matches!(*name, "" | "identity" | "aws-chunked");
+    text(headers, CONTENT_ENCODING.as_str())?.split(',').map(str::trim).find(|name| !plain(name))
 }
 
 impl ContentRange {
@@ -82,6 +89,15 @@ mod tests {
             assert_eq!(range(wrong), None, "{wrong}");
         }
         assert_eq!(range("bytes 0-18446744073709551615/18446744073709551615"), None, "no overflow");
+    }
+
+    #[test]
+    fn what_is_not_compressed_is_known() {
+        for plain in ["", "identity", "aws-chunked", "aws-chunked,"] {
+            assert_eq!(compression(&headers(&[("content-encoding", plain)])), None, "{plain}");
+        }
+        assert_eq!(compression(&headers(&[("content-encoding", "aws-chunked, gzip")])), Some("gzip"));
+        assert_eq!(compression(&headers(&[])), None);
     }
 
     #[test]

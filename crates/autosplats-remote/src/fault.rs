@@ -8,7 +8,6 @@ use autosplats_cloud::{Error, printable};
 use rustls::CertificateError;
 use ureq::Timeout;
 use ureq::http::{HeaderMap, StatusCode};
-use url::Url;
 
 use crate::content_range::text;
 
@@ -52,29 +51,29 @@ impl Fault {
         Self::last("the file changed while it was read; open it again")
     }
 
-    /// A fault of the connection to `url`. `answered` tells whether the server has answered before.
-    pub(crate) fn of_connection(error: ureq::Error, url: &Url, answered: bool, limits: [Duration; 2]) -> Self {
+    /// A fault of the connection to `peer`. `answered` tells whether it has answered before. The limits are those of
+    /// connecting and of waiting.
+    pub(crate) fn of_connection(error: ureq::Error, peer: &str, answered: bool, limits: [Duration; 2]) -> Self {
         let [connect, idle] = limits.map(|limit| limit.as_secs_f32());
-        let host = printable(url.host_str().unwrap_or_default());
-        let port = url.port_or_known_default().unwrap_or_default();
         match error {
             ureq::Error::Timeout(Timeout::Resolve | Timeout::Connect) => Self::Passing(
-                format!("no connection to {host}, port {port}, within {connect} s; check the address and the network"),
+                format!("no connection to {peer} within {connect} s; check the address and the network"),
                 Wait::Once,
             ),
             ureq::Error::Timeout(_) => Self::Passing(format!("the server sends nothing for {idle} s"), Wait::Once),
-            ureq::Error::HostNotFound => unknown_host(&host),
+            ureq::Error::HostNotFound => unknown_host(peer),
             ureq::Error::Rustls(error) => encryption(&error),
-            ureq::Error::Io(error) => of_system(&error, &host, port, answered),
+            ureq::Error::Io(error) => of_system(&error, peer, answered),
             ureq::Error::ConnectProxyFailed(why) => {
-                Self::Final(format!("the proxy of the environment refuses: {}; check HTTPS_PROXY", printable(&why)))
+                let why = printable(&why);
+                let remedy =
+                    if why.contains("407") { "put name and password into that variable" } else { "ask its owner" };
+                Self::Final(format!("{peer} does not let it through ({why}); {remedy}"))
             }
             ureq::Error::LargeResponseHeader(..) => {
                 Self::last("the server sends headers without an end; tell its owner")
             }
-            ureq::Error::Protocol(_) => {
-                Self::Final(format!("what answers at {host}, port {port}, is no HTTP; check the address"))
-            }
+            ureq::Error::Protocol(_) => Self::Final(format!("what answers at {peer} is no HTTP; check the address")),
             ureq::Error::BadUri(_) | ureq::Error::Http(_) => Self::last("it is no address that can be asked for"),
             other => Self::Final(format!("the request failed: {}; try again", printable(&other.to_string()))),
         }
@@ -89,7 +88,6 @@ impl Fault {
             403 if signed => "these credentials may not read it, or there is no such file; check the AWS_ variables",
             403 => "it may not be read; a signed address may have expired, else give credentials",
             404 | 410 => "there is no such file; check the address",
-            407 => "the proxy asks who you are; put name and password into HTTPS_PROXY",
             408 | 429 | 500 | 502 | 503 | 504 => {
                 let seconds = text(headers, "retry-after").and_then(|value| value.parse().ok());
                 let wait = seconds.map_or(Wait::Usual, |seconds| Wait::Told(Duration::from_secs(seconds)));
@@ -101,26 +99,27 @@ impl Fault {
     }
 }
 
-fn unknown_host(host: &str) -> Fault {
-    Fault::Final(format!("the host '{host}' is not found; check the address and the network"))
+fn unknown_host(peer: &str) -> Fault {
+    Fault::Final(format!("{peer} is not found; check the address and the network"))
 }
 
-fn of_system(error: &io::Error, host: &str, port: u16, answered: bool) -> Fault {
+fn of_system(error: &io::Error, peer: &str, answered: bool) -> Fault {
     let inner = error.get_ref().and_then(|inner| inner.downcast_ref::<rustls::Error>());
     if let Some(inner) = inner {
         return encryption(inner);
     }
     match error.kind() {
         ErrorKind::ConnectionRefused if answered => {
-            Fault::Passing("the server takes no connections any more".into(), Wait::Usual)
+            Fault::Passing(format!("{peer} takes no connections any more"), Wait::Usual)
         }
         ErrorKind::ConnectionRefused => {
-            Fault::Final(format!("nobody answers at {host}, port {port}; check the address, and that the server runs"))
+            Fault::Final(format!("nobody answers at {peer}; check the address, and that the server runs"))
         }
         ErrorKind::HostUnreachable | ErrorKind::NetworkUnreachable | ErrorKind::NetworkDown => {
-            Fault::Passing(format!("{host} cannot be reached; check the network"), Wait::Once)
+            Fault::Passing(format!("{peer} cannot be reached; check the network"), Wait::Once)
         }
-        _ if error.to_string().contains("lookup address") => unknown_host(host),
+        // The standard library has no kind for it.
+        _ if error.to_string().contains("lookup address") => unknown_host(peer),
         _ => Fault::Passing("the connection broke off".into(), Wait::Usual),
     }
 }

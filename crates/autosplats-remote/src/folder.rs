@@ -10,19 +10,20 @@ use flate2::read::MultiGzDecoder;
 
 use crate::address::Address;
 use crate::batch;
-use crate::client::{Ask, Client, Target, announced};
-use crate::content_range::{length, text};
+use crate::content_range::{compression, length};
 use crate::fault::Fault;
-use crate::kept::Kept;
-use crate::options::RemoteOptions;
+use crate::kept::Part;
+use crate::network::{Ask, Network, Received, Target, announced};
 use crate::patience::Stop;
 
 /// The folder of an address.
 pub(crate) struct RemoteFolder {
     name: PathBuf,
     base: Address,
-    client: Arc<Client>,
-    kept: Kept<String>,
+    network: Arc<Network>,
+    received: Arc<Received>,
+    /// What the cache knows the folder by.
+    owner: u64,
 }
 
 impl fmt::Debug for RemoteFolder {
@@ -32,10 +33,10 @@ impl fmt::Debug for RemoteFolder {
 }
 
 impl RemoteFolder {
-    pub(crate) fn open(address: &str, options: &RemoteOptions) -> Result<Self, Error> {
-        let base = Address::parse(address, options)?;
-        let client = Arc::new(Client::new(options));
-        Ok(Self { name: base.folder().into(), base, client, kept: Kept::new(options.cache) })
+    pub(crate) fn open(address: &str, network: &Arc<Network>) -> Result<Self, Error> {
+        let base = Address::parse(address, &network.options)?;
+        let (name, owner) = (base.folder().into(), network.kept.owner());
+        Ok(Self { name, base, network: network.clone(), received: Arc::default(), owner })
     }
 }
 
@@ -48,20 +49,21 @@ impl Folder for RemoteFolder {
         let mut missing = Vec::new();
         let mut read: Vec<Vec<u8>> = Vec::with_capacity(names.len());
         for (at, name) in names.iter().enumerate() {
-            read.push(self.kept.get(name).unwrap_or_else(|| {
+            read.push(self.network.kept.get(self.owner, Part::Named(name.clone())).unwrap_or_else(|| {
                 missing.push(at);
                 Vec::new()
             }));
         }
-        let targets: Vec<Target> = missing.iter().map(|&at| Target::new(self.base.file(&names[at]))).collect();
-        let client = self.client.clone();
-        let job = move |at: usize, stop: &Stop| whole(&client, &targets[at], most, stop);
+        let targets: Vec<Target> =
+            missing.iter().map(|&at| Target::new(self.base.file(&names[at]), self.received.clone())).collect();
+        let network = self.network.clone();
+        let job = move |at: usize, stop: &Stop| whole(&network, &targets[at], most, stop);
         let deliver = |at: usize, bytes: Vec<u8>| {
-            self.kept.insert(names[missing[at]].clone(), &bytes);
+            self.network.kept.insert(self.owner, Part::Named(names[missing[at]].clone()), &bytes);
             read[missing[at]] = bytes;
             Ok(())
         };
-        batch::run(&self.client.gate, missing.len(), job, progress, deliver)?;
+        batch::run(&self.network.gate, &self.base.folder(), missing.len(), job, progress, deliver)?;
         // What is kept may have been read with a higher limit.
         match read.iter().zip(names).find(|(bytes, _)| bytes.len() as u64 > most) {
             Some((bytes, name)) => Err(too_large(self.base.file(name).shown(), bytes.len() as u64, most)),
@@ -70,29 +72,29 @@ impl Folder for RemoteFolder {
     }
 
     fn traffic(&self) -> Traffic {
-        self.client.traffic()
+        self.received.traffic()
     }
 }
 
 /// The bytes of a file of at most `most` bytes.
-fn whole(client: &Client, target: &Target, most: u64, stop: &Stop) -> Result<Vec<u8>, Error> {
-    let mut patience = client.patience(target, stop);
+fn whole(network: &Network, target: &Target, most: u64, stop: &Stop) -> Result<Vec<u8>, Error> {
+    let mut patience = network.patience(target, stop);
     loop {
-        match try_whole(client, target, most, stop) {
+        match try_whole(network, target, most, stop) {
             Ok(bytes) => return Ok(bytes),
             Err(fault) => patience.after(fault)?,
         }
     }
 }
 
-fn try_whole(client: &Client, target: &Target, most: u64, stop: &Stop) -> Result<Vec<u8>, Fault> {
+fn try_whole(network: &Network, target: &Target, most: u64, stop: &Stop) -> Result<Vec<u8>, Fault> {
     let shown = target.address.shown();
-    let response = client.get(target, &Ask::Whole)?;
+    let response = network.get(target, &Ask::Whole)?;
     if response.status() != 200 {
         return Err(Fault::last("the server sends a part of what was asked for; check the address"));
     }
-    let compressed = match text(response.headers(), "content-encoding") {
-        None | Some("identity" | "") => false,
+    let compressed = match compression(response.headers()) {
+        None => false,
         Some("gzip" | "x-gzip") => true,
         Some(_) => {
             return Err(Fault::last("the server compresses it in a way that it was not asked for; tell its owner"));
@@ -103,7 +105,7 @@ fn try_whole(client: &Client, target: &Target, most: u64, stop: &Stop) -> Result
     }
     check_memory("a file of a tree", length(response.headers()).unwrap_or(0))?;
     let mut bytes = Vec::new();
-    if !client.body(response, target, &mut bytes, most, stop)? {
+    if !network.body(response, target, &mut bytes, most, stop)? {
         return Err(too_large(shown, bytes.len() as u64, most).into());
     }
     if !compressed {

@@ -1,7 +1,7 @@
 //! What was fetched, kept in memory for the next time.
 
-use std::hash::Hash;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use quick_cache::sync::{Cache, DefaultLifecycle};
 use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
@@ -12,19 +12,31 @@ const USUAL_ENTRIES: usize = 1024;
 /// Bytes of an entry besides its own.
 const OVERHEAD: u64 = 128;
 
-/// A bounded cache of bytes.
-pub(crate) struct Kept<K>(Cache<K, Arc<[u8]>, Bytes>);
+/// A bounded cache of the bytes of files.
+pub(crate) struct Kept {
+    bytes: Cache<(u64, Part), Arc<[u8]>, Weight>,
+    owners: AtomicU64,
+}
+
+/// What an entry is of its owner.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Part {
+    /// From this byte up to that one.
+    Range(u64, u64),
+    /// The file of this name.
+    Named(String),
+}
 
 #[derive(Clone)]
-struct Bytes;
+struct Weight;
 
-impl<K> Weighter<K, Arc<[u8]>> for Bytes {
-    fn weight(&self, _: &K, bytes: &Arc<[u8]>) -> u64 {
+impl Weighter<(u64, Part), Arc<[u8]>> for Weight {
+    fn weight(&self, _: &(u64, Part), bytes: &Arc<[u8]>) -> u64 {
         bytes.len() as u64 + OVERHEAD
     }
 }
 
-impl<K: Eq + Hash + Clone> Kept<K> {
+impl Kept {
     /// A cache of at most `most` bytes.
     pub(crate) fn new(most: u64) -> Self {
         // One shard, so that an entry may take all of the room.
@@ -34,15 +46,21 @@ impl<K: Eq + Hash + Clone> Kept<K> {
             .weight_capacity(most)
             .build()
             .expect("all that it asks for is given");
-        Self(Cache::with_options(options, Bytes, DefaultHashBuilder::default(), DefaultLifecycle::default()))
+        let bytes = Cache::with_options(options, Weight, DefaultHashBuilder::default(), DefaultLifecycle::default());
+        Self { bytes, owners: AtomicU64::new(0) }
     }
 
-    pub(crate) fn get(&self, key: &K) -> Option<Vec<u8>> {
-        self.0.get(key).map(|bytes| bytes.to_vec())
+    /// A number for a file or folder, under which its bytes are kept.
+    pub(crate) fn owner(&self) -> u64 {
+        self.owners.fetch_add(1, Ordering::Relaxed)
     }
 
-    pub(crate) fn insert(&self, key: K, bytes: &[u8]) {
-        self.0.insert(key, bytes.into());
+    pub(crate) fn get(&self, owner: u64, part: Part) -> Option<Vec<u8>> {
+        self.bytes.get(&(owner, part)).map(|bytes| bytes.to_vec())
+    }
+
+    pub(crate) fn insert(&self, owner: u64, part: Part, bytes: &[u8]) {
+        self.bytes.insert((owner, part), bytes.into());
     }
 }
 
@@ -53,16 +71,17 @@ mod tests {
     #[test]
     fn the_cache_is_bounded() {
         let kept = Kept::new(100_000);
+        let (owner, other) = (kept.owner(), kept.owner());
+        let part = |at: u64| Part::Range(at, at + 10_000);
         for at in 0..1000 {
-            kept.insert(at, &[at as u8; 10_000]);
-            assert!(kept.0.weight() <= 100_000, "{} bytes", kept.0.weight());
+            kept.insert(owner, part(at), &[at as u8; 10_000]);
+            assert!(kept.bytes.weight() <= 100_000, "{} bytes", kept.bytes.weight());
         }
-        let there = (0..1000).filter(|at| kept.get(at).is_some_and(|bytes| bytes == [*at as u8; 10_000])).count();
-        assert!((5..=9).contains(&there), "{there} entries");
-        kept.insert(1, &[0; 200_000]);
-        assert!(kept.get(&1).is_none_or(|bytes| bytes.len() == 10_000), "what is larger than all of it is not kept");
-        let none = Kept::new(0);
-        none.insert(1, &[1]);
-        assert_eq!(none.get(&1), None, "no room at all");
+        let bytes = |at: &u64| kept.get(owner, part(*at)).is_some_and(|bytes| bytes == [*at as u8; 10_000]);
+        let there: Vec<u64> = (0..1000).filter(bytes).collect();
+        assert!((5..=9).contains(&there.len()), "{there:?}");
+        assert!(there.iter().all(|at| kept.get(other, part(*at)).is_none()), "those of another file");
+        kept.insert(owner, Part::Named("a".into()), &[0; 200_000]);
+        assert_eq!(kept.get(owner, Part::Named("a".into())), None, "larger than all of the room");
     }
 }

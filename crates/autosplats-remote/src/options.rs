@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
+use ureq::http::header::AUTHORIZATION;
 use ureq::http::{HeaderName, HeaderValue};
 
 use crate::proxies::Proxies;
@@ -32,7 +33,7 @@ pub struct RemoteOptions {
     pub idle_timeout: Duration,
     /// Wait before a request is tried again. Each further wait is twice as long. Default 250 ms.
     pub retry_wait: Duration,
-    /// Bytes of each file or folder that are kept in memory. Default 64 MB.
+    /// Bytes of all files together that are kept in memory. Default 64 MB.
     pub cache: u64,
     /// Credentials that sign requests to `s3://` addresses. Default `None`: unsigned, for public buckets.
     pub credentials: Option<Credentials>,
@@ -125,6 +126,13 @@ pub struct Credentials {
 pub struct Header {
     pub(crate) name: HeaderName,
     pub(crate) value: HeaderValue,
+}
+
+impl Header {
+    /// Whether the header says who asks.
+    pub(crate) fn authorizes(&self) -> bool {
+        self.name == AUTHORIZATION
+    }
 }
 
 impl fmt::Debug for Header {

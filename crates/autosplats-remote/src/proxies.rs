@@ -15,6 +15,13 @@ pub struct Proxies {
     direct: Vec<String>,
 }
 
+/// How an address is reached.
+pub(crate) struct Route {
+    pub(crate) proxy: Option<Proxy>,
+    /// Who is connected to, for messages.
+    pub(crate) peer: String,
+}
+
 /// A variable and its value.
 type Named = (String, String);
 
@@ -42,11 +49,16 @@ impl Proxies {
         }
     }
 
-    /// The proxy for an address; its variable if that is not valid. This machine is always reached without one.
-    pub(crate) fn of(&self, url: &Url) -> Result<Option<Proxy>, String> {
+    /// How an address is reached; the variable of its proxy if that is not valid.
+    pub(crate) fn route(&self, url: &Url) -> Result<Route, String> {
         let chosen = if url.scheme() == "https" { &self.https } else { &self.http };
-        let Some((variable, value)) = chosen.as_ref().filter(|_| !self.is_direct(url)) else { return Ok(None) };
-        Proxy::new(value).map(Some).map_err(|_| variable.clone())
+        let Some((variable, value)) = chosen.as_ref().filter(|_| !self.is_direct(url)) else {
+            let port = url.port_or_known_default().unwrap_or_default();
+            return Ok(Route { proxy: None, peer: format!("{}, port {port}", url.host_str().unwrap_or_default()) });
+        };
+        let proxy = Proxy::new(value).map_err(|_| variable.clone())?;
+        let peer = format!("the proxy of {variable}, {}, port {}", proxy.host(), proxy.port());
+        Ok(Route { proxy: Some(proxy), peer })
     }
 
     fn is_direct(&self, url: &Url) -> bool {
@@ -85,8 +97,8 @@ mod tests {
         };
         let proxies = Proxies::from_variables(&variables);
         let host = |address: &str| {
-            let proxy = proxies.of(&Url::parse(address).expect("an address")).expect("they are valid");
-            proxy.map(|proxy| proxy.host().to_owned())
+            let route = proxies.route(&Url::parse(address).expect("an address")).expect("they are valid");
+            route.proxy.map(|proxy| proxy.host().to_owned())
         };
         assert_eq!(host("https://example.com/a").as_deref(), Some("safe"));
         assert_eq!(host("http://example.com/a").as_deref(), Some("any"));
@@ -104,7 +116,7 @@ mod tests {
     #[test]
     fn a_proxy_that_is_no_address_is_named_by_its_variable() {
         let proxies = Proxies::from_variables(&|name| (name == "ALL_PROXY").then(|| "gopher://x".into()));
-        let wrong = proxies.of(&Url::parse("https://example.org").expect("an address"));
+        let wrong = proxies.route(&Url::parse("https://example.org").expect("an address"));
         assert_eq!(wrong.err().as_deref(), Some("ALL_PROXY"));
     }
 }

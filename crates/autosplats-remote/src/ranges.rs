@@ -9,11 +9,10 @@ use autosplats_cloud::{Error, Progress, Ranges, Traffic, check_memory, check_ran
 
 use crate::address::Address;
 use crate::batch;
-use crate::client::{Ask, Client, Target, announced, check_plain};
-use crate::content_range::{ContentRange, Version};
+use crate::content_range::{ContentRange, Version, length};
 use crate::fault::{Fault, Wait};
-use crate::kept::Kept;
-use crate::options::RemoteOptions;
+use crate::kept::Part;
+use crate::network::{Ask, Network, Target, announced, check_plain};
 use crate::patience::Stop;
 use crate::plan::spans;
 
@@ -27,12 +26,13 @@ pub(crate) struct RemoteRanges {
     version: Version,
     /// The first bytes, or all of them.
     head: Vec<u8>,
-    kept: Kept<(u64, u64)>,
+    /// What the cache knows the file by.
+    owner: u64,
 }
 
 #[derive(Debug)]
 struct File {
-    client: Client,
+    network: Arc<Network>,
     target: Target,
 }
 
@@ -43,21 +43,21 @@ impl fmt::Debug for RemoteRanges {
 }
 
 impl RemoteRanges {
-    pub(crate) fn open(address: &str, options: &RemoteOptions, progress: &dyn Progress) -> Result<Self, Error> {
-        let target = Target::new(Address::parse(address, options)?);
+    pub(crate) fn open(address: &str, network: &Arc<Network>, progress: &dyn Progress) -> Result<Self, Error> {
+        let target = Target::new(Address::parse(address, &network.options)?, Arc::default());
         let name = PathBuf::from(target.address.shown());
-        let file = Arc::new(File { client: Client::new(options), target });
+        let file = Arc::new(File { network: network.clone(), target });
         let (mut opened, opening) = (None, file.clone());
         let keep = |_, found| {
             opened = Some(found);
             Ok(())
         };
-        batch::run(&file.client.gate, 1, move |_, stop| opening.first(stop), progress, keep)?;
+        file.run(1, move |_, stop| opening.first(stop), progress, keep)?;
         let (version, head) = opened.ok_or(Error::Cancelled)?;
         if head.len() as u64 == version.size && version.size > HEAD {
             progress.note(&format!("its server sends no parts of files; all {} bytes were loaded", version.size));
         }
-        Ok(Self { name, file, version, head, kept: Kept::new(options.cache) })
+        Ok(Self { name, file, version, head, owner: network.kept.owner() })
     }
 
     /// The bytes of a range that are in memory.
@@ -65,7 +65,7 @@ impl RemoteRanges {
         if range.end <= self.head.len() as u64 {
             return Some(self.head[range.start as usize..range.end as usize].to_vec());
         }
-        self.kept.get(&(range.start, range.end))
+        self.file.network.kept.get(self.owner, Part::Range(range.start, range.end))
     }
 }
 
@@ -100,22 +100,33 @@ impl Ranges for RemoteRanges {
             spans[at].deliver(&bytes, ranges, &mut read);
             Ok(())
         };
-        batch::run(&self.file.client.gate, spans.len(), job, progress, deliver)?;
+        self.file.run(spans.len(), job, progress, deliver)?;
         for at in missing {
-            self.kept.insert((ranges[at].start, ranges[at].end), &read[at]);
+            let part = Part::Range(ranges[at].start, ranges[at].end);
+            self.file.network.kept.insert(self.owner, part, &read[at]);
         }
         Ok(read)
     }
 
     fn traffic(&self) -> Traffic {
-        self.file.client.traffic()
+        self.file.target.received.traffic()
     }
 }
 
 impl File {
+    fn run<T: Send + 'static>(
+        &self,
+        jobs: usize,
+        job: impl Fn(usize, &Stop) -> Result<T, Error> + Send + Sync + 'static,
+        progress: &dyn Progress,
+        done: impl FnMut(usize, T) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        batch::run(&self.network.gate, self.target.address.shown(), jobs, job, progress, done)
+    }
+
     /// The version of the file and its first bytes.
     fn first(&self, stop: &Stop) -> Result<(Version, Vec<u8>), Error> {
-        let mut patience = self.client.patience(&self.target, stop);
+        let mut patience = self.network.patience(&self.target, stop);
         loop {
             match self.try_first(stop) {
                 Ok(first) => return Ok(first),
@@ -125,7 +136,7 @@ impl File {
     }
 
     fn try_first(&self, stop: &Stop) -> Result<(Version, Vec<u8>), Fault> {
-        let response = self.client.get(&self.target, &Ask::Part(0..HEAD, None))?;
+        let response = self.network.get(&self.target, &Ask::Part(0..HEAD, None))?;
         check_plain(&response)?;
         let headers = response.headers().clone();
         let mut head = Vec::new();
@@ -136,20 +147,21 @@ impl File {
                 if sized.part.start != 0 || sized.part.end > wanted || announced(&response, wanted).is_some() {
                     return Err(unclear());
                 }
-                if !self.client.body(response, &self.target, &mut head, wanted, stop)? {
+                if !self.network.body(response, &self.target, &mut head, wanted, stop)? {
                     return Err(unclear());
                 }
                 Ok((Version::of(&headers, sized.size), head))
             }
             200 => {
-                let most = self.client.options.cache.max(HEAD);
+                let most = self.network.options.cache.max(HEAD);
+                check_memory("a file", length(&headers).unwrap_or(0).min(most))?;
                 let refuse = || {
                     Fault::Final(format!(
                         "the server sends no parts of files, and more than {most} bytes are not loaded whole; download it"
                     ))
                 };
                 if announced(&response, most).is_some()
-                    || !self.client.body(response, &self.target, &mut head, most, stop)?
+                    || !self.network.body(response, &self.target, &mut head, most, stop)?
                 {
                     return Err(refuse());
                 }
@@ -164,7 +176,7 @@ impl File {
     fn part(&self, part: &Range<u64>, version: &Version, stop: &Stop) -> Result<Vec<u8>, Error> {
         let len = part.end - part.start;
         let mut bytes = Vec::with_capacity(len as usize);
-        let mut patience = self.client.patience(&self.target, stop);
+        let mut patience = self.network.patience(&self.target, stop);
         while (bytes.len() as u64) < len {
             let rest = part.start + bytes.len() as u64..part.end;
             if let Err(fault) = self.try_part(&rest, version, &mut bytes, len, stop) {
@@ -184,7 +196,7 @@ impl File {
         most: u64,
         stop: &Stop,
     ) -> Result<(), Fault> {
-        let response = self.client.get(&self.target, &Ask::Part(part.clone(), version.strong_tag()))?;
+        let response = self.network.get(&self.target, &Ask::Part(part.clone(), version.strong_tag()))?;
         check_plain(&response)?;
         let headers = response.headers();
         match response.status().as_u16() {
@@ -199,7 +211,7 @@ impl File {
                 if announced(&response, part.end - part.start).is_some() {
                     return Err(unclear());
                 }
-                if self.client.body(response, &self.target, bytes, most, stop)? { Ok(()) } else { Err(unclear()) }
+                if self.network.body(response, &self.target, bytes, most, stop)? { Ok(()) } else { Err(unclear()) }
             }
             200 if version.same(&Version::of(headers, version.size)) => {
                 Err(Fault::last("the server sends parts of files only sometimes; download it"))

@@ -1,19 +1,28 @@
 //! Encrypted connections.
 
 use std::net::TcpListener;
+use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
 
-use autosplats_remote::{RemoteOptions, open};
+use autosplats_remote::RemoteOptions;
 use autosplats_serve::Site;
 use rcgen::{CertifiedKey, generate_simple_self_signed};
 use rustls::pki_types::PrivateKeyDer;
 use rustls::{ServerConfig, ServerConnection, StreamOwned};
 
-use crate::{bytes, part, quick};
+use crate::{bytes, open, part, quick};
+
+/// Names the address that the test opens when it runs as its own child.
+const ADDRESS: &str = "AUTOSPLATS_TEST_ADDRESS";
 
 #[test]
 fn certificates_must_be_trusted() {
+    if let Ok(address) = std::env::var(ADDRESS) {
+        let file = open(&address, &quick(), &()).unwrap();
+        assert_eq!(file.size(), 200_000);
+        return;
+    }
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a"), bytes(0..200_000)).unwrap();
     let CertifiedKey { cert, signing_key } = generate_simple_self_signed(["localhost".to_owned()]).unwrap();
@@ -49,6 +58,14 @@ fn certificates_must_be_trusted() {
     assert_eq!(fault("localhost", &nobody), untrusted("no authority known here has issued it"));
     // With the system's authorities, if there are any.
     assert!(fault("localhost", &quick()).contains("certificate"), "{}", fault("localhost", &quick()));
+    // Other systems have no variable for it.
+    if cfg!(target_os = "linux") {
+        let (file, mut child) = (folder.path().join("pem"), Command::new(std::env::current_exe().unwrap()));
+        std::fs::write(&file, cert.pem()).unwrap();
+        child.args(["--exact", "encrypted::certificates_must_be_trusted"]);
+        let outcome = child.env("SSL_CERT_FILE", file).env(ADDRESS, address("localhost")).output().unwrap();
+        assert!(outcome.status.success(), "{outcome:?}");
+    }
 
     let plain = crate::Site::new();
     let told = open(&plain.server.address("a").replace("http:", "https:"), &trusting, &()).unwrap_err().to_string();

@@ -4,9 +4,9 @@ use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
 use autosplats_cloud::ErrorKind;
-use autosplats_remote::{RemoteOptions, open};
+use autosplats_remote::RemoteOptions;
 
-use crate::{SIZE, Site, bytes, part, quick};
+use crate::{SIZE, Site, bytes, open, part, quick};
 
 /// Faults that pass: the file is read in spite of them.
 #[test]
@@ -80,9 +80,7 @@ fn each_fault_is_one_line_with_a_remedy() {
         assert_eq!(site.fault(path), what, "{path}");
     }
     let noise = site.fault("~noise/scan.laz");
-    assert!(
-        noise.starts_with("what answers at 127.0.0.1, port ") && noise.ends_with(", is no HTTP; check the address")
-    );
+    assert!(noise.starts_with("what answers at 127.0.0.1, port ") && noise.ends_with(" is no HTTP; check the address"));
 }
 
 #[test]

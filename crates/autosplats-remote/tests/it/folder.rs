@@ -3,10 +3,9 @@
 use std::io::Write as _;
 
 use autosplats_cloud::{Error, Traffic};
-use autosplats_remote::open_folder;
 use flate2::{Compression, write::GzEncoder};
 
-use crate::{Site, quick};
+use crate::{Site, open_folder, quick};
 
 #[test]
 fn files_are_read_whole_and_kept() {

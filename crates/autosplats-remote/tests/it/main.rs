@@ -5,6 +5,7 @@
 mod encrypted;
 mod faults;
 mod folder;
+mod proxy;
 mod ranges;
 mod stores;
 
@@ -12,8 +13,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use autosplats_cloud::{Error, Ranges};
-use autosplats_remote::{RemoteOptions, open};
+use autosplats_cloud::{Error, Folder, Progress, Ranges};
+use autosplats_remote::{Client, RemoteOptions};
 use autosplats_serve::Server;
 
 /// Size of the served file.
@@ -53,13 +54,13 @@ impl Site {
     }
 
     fn open(&self, path: &str) -> Result<Arc<dyn Ranges>, Error> {
-        open(&self.server.address(path), &quick(), &())
+        open(&self.server.address(path), &fitting(path), &())
     }
 
     /// What opening or reading the file says behind its address.
     fn fault(&self, path: &str) -> String {
         let address = self.server.address(path);
-        let outcome = open(&address, &quick(), &()).and_then(|file| part(&*file, 500_000..900_000));
+        let outcome = open(&address, &fitting(path), &()).and_then(|file| part(&*file, 500_000..900_000));
         let error = outcome.expect_err(path);
         assert!(matches!(error, Error::Remote { .. }), "{path}: {error:?}");
         let told = error.to_string();
@@ -69,11 +70,23 @@ impl Site {
     }
 }
 
-/// Options that do not wait for long.
+/// Opens a file with a client of its own.
+fn open(address: &str, options: &RemoteOptions, progress: &dyn Progress) -> Result<Arc<dyn Ranges>, Error> {
+    Client::new(options.clone()).open(address, progress)
+}
+
+fn open_folder(address: &str, options: &RemoteOptions) -> Result<Arc<dyn Folder>, Error> {
+    Client::new(options.clone()).open_folder(address)
+}
+
+/// Options that try again at once.
 fn quick() -> RemoteOptions {
-    RemoteOptions {
-        retry_wait: Duration::from_millis(1),
-        idle_timeout: Duration::from_millis(300),
-        ..RemoteOptions::default()
-    }
+    RemoteOptions { retry_wait: Duration::from_millis(1), ..RemoteOptions::default() }
+}
+
+/// Options for a path: for a server that is silent they wait for a short while only.
+fn fitting(path: &str) -> RemoteOptions {
+    let silent = path.starts_with("~silent") || path.starts_with("~stalls");
+    let idle_timeout = Duration::from_millis(if silent { 300 } else { 30_000 });
+    RemoteOptions { idle_timeout, ..quick() }
 }

@@ -4,10 +4,10 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use autosplats_cloud::{Error, Progress, Traffic};
-use autosplats_remote::{Header, RemoteOptions, is_address, open};
+use autosplats_remote::{Client, Header, RemoteOptions, is_address};
 use autosplats_serve::Server;
 
-use crate::{SIZE, Site, byte, bytes, part, quick};
+use crate::{SIZE, Site, byte, bytes, open, open_folder, part, quick};
 
 #[derive(Default)]
 struct Notes(Mutex<Vec<String>>);
@@ -96,6 +96,19 @@ fn a_server_without_ranges_gives_all_of_what_is_small() {
 }
 
 #[test]
+fn names_may_have_any_characters() {
+    let site = Site::new();
+    for name in ["a b", "ä+&=;", "a|b^c{d}[e]", "50%", "a'b\"c<d>", "~", "a:b@c"] {
+        site.add(name, name.as_bytes());
+        let encoded = name.replace('%', "%25");
+        let file = open(&site.server.address(&encoded), &quick(), &()).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(part(&*file, 0..name.len() as u64).unwrap(), name.as_bytes(), "{name}");
+        let folder = open_folder(&site.server.address(""), &quick()).unwrap();
+        assert_eq!(folder.read(&[name.to_owned()], 99, &()).unwrap(), [name.as_bytes()], "{name}");
+    }
+}
+
+#[test]
 fn queries_are_sent_and_not_shown() {
     let site = Site::new();
     let file = site.open("scan.laz?X-Amz-Signature=abc&b=%20").unwrap();
@@ -121,6 +134,9 @@ fn headers_reach_only_the_host_they_are_for() {
     assert_eq!(with("scan.laz"), [(true, true); 2]);
     assert_eq!(with("~moved/scan.laz"), [(true, true); 3], "it stays on the host, and is not moved again");
     assert_eq!(with("~elsewhere/scan.laz"), [(true, true), (false, false), (false, false)]);
+    let told = open(&site.server.address("~elsewhere/~401/a"), &options, &()).unwrap_err().to_string();
+    let what = "it redirects to localhost, which answers 401 and gets no headers; give the address there";
+    assert!(told.ends_with(what), "{told}");
     let user = site.server.address("scan.laz").replace("http://", "http://me:secret@");
     let file = open(&user, &quick(), &()).unwrap();
     assert_eq!(file.name().to_str().unwrap(), site.server.address("scan.laz"), "the password is not shown");
@@ -138,7 +154,7 @@ fn cancelling_ends_waits_at_once() {
         let until = Until(start + Duration::from_millis(100));
         let outcome = open(&site.server.address(path), &options, &until);
         assert!(matches!(outcome, Err(Error::Cancelled)), "{path}: {outcome:?}");
-        assert!(start.elapsed() < Duration::from_millis(350), "{path}: {:?}", start.elapsed());
+        assert!(start.elapsed() < Duration::from_secs(1), "{path}: {:?}", start.elapsed());
     }
 }
 
@@ -168,4 +184,26 @@ fn addresses_are_told_from_files() {
     for name in ["a.laz", "c:\\a", "/http://a", "zenoh://a", "scene:figure", "http:/a", ""] {
         assert!(!is_address(name), "{name}");
     }
+}
+
+#[test]
+fn files_of_a_client_share_connections_and_memory() {
+    let site = Site::new();
+    site.add("other", &[9; 200_000]);
+    let client = Client::new(RemoteOptions { cache: 250_000, ..quick() });
+    let [file, other] = ["scan.laz", "other"].map(|path| client.open(&site.server.address(path), &()).unwrap());
+    let range = 100_000..200_000;
+    assert_eq!(part(&*file, range.clone()).unwrap(), bytes(range.clone()));
+    assert_eq!(part(&*other, range.clone()).unwrap(), [9; 100_000], "the same range of another file");
+    assert_eq!([&file, &other].map(|file| file.traffic().requests), [2, 2], "each counts its own");
+    assert_eq!(part(&*file, range.clone()).unwrap(), bytes(range.clone()));
+    assert_eq!(site.server.counts().requests, 4, "both are kept");
+    for at in 0..5 {
+        part(&*file, 500_000 + at * 100_000..600_000 + at * 100_000).unwrap();
+    }
+    let before = site.server.counts().requests;
+    part(&*other, range.clone()).unwrap();
+    part(&*file, range).unwrap();
+    assert!(site.server.counts().requests > before, "there is no room for all");
+    assert_eq!(site.server.counts().connections, 1, "one after the other");
 }

@@ -1,8 +1,8 @@
 //! Object stores with a server of one's own.
 
-use autosplats_remote::{Credentials, RemoteOptions, Secret, open, open_folder};
+use autosplats_remote::{Credentials, RemoteOptions, Secret};
 
-use crate::{Site, bytes, part, quick};
+use crate::{Site, bytes, open, open_folder, part, quick};
 
 #[test]
 fn buckets_are_read_signed_or_not() {

@@ -1,12 +1,12 @@
-//! One request and its answer.
+//! Connections, and one request and its answer.
 
 use std::fmt;
 use std::io::Read as _;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use autosplats_cloud::Traffic;
+use autosplats_cloud::{Traffic, printable};
 use ureq::http::Response;
 use ureq::tls::{Certificate, RootCerts, TlsConfig};
 use ureq::{Agent, Body};
@@ -14,10 +14,12 @@ use url::Url;
 
 use crate::address::Address;
 use crate::batch::{AT_ONCE, Gate};
-use crate::content_range::{length, text};
+use crate::content_range::{compression, length, text};
 use crate::fault::{Fault, Wait};
-use crate::options::RemoteOptions;
+use crate::kept::Kept;
+use crate::options::{Header, RemoteOptions};
 use crate::patience::{Patience, Stop};
+use crate::proxies::Route;
 
 /// Most redirects of one request.
 const MOST_REDIRECTS: usize = 10;
@@ -28,13 +30,18 @@ const BLOCK: usize = 64 << 10;
 /// Bytes that are read of the explanation of an error.
 const EXPLANATION: u64 = 4 << 10;
 
-/// A client with its connections.
-pub(crate) struct Client {
+/// What all files and folders of a client share.
+pub(crate) struct Network {
     agent: Agent,
     pub(crate) options: RemoteOptions,
     pub(crate) gate: Arc<Gate>,
-    /// Whether a server has answered.
-    answered: AtomicBool,
+    pub(crate) kept: Kept,
+}
+
+/// What was received of one file or folder.
+#[derive(Debug, Default)]
+pub(crate) struct Received {
+    answers: AtomicU64,
     requests: AtomicU64,
     bytes: AtomicU64,
 }
@@ -43,6 +50,7 @@ pub(crate) struct Client {
 #[derive(Debug)]
 pub(crate) struct Target {
     pub(crate) address: Address,
+    pub(crate) received: Arc<Received>,
     moved: Mutex<Option<Url>>,
 }
 
@@ -54,15 +62,21 @@ pub(crate) enum Ask<'a> {
     Whole,
 }
 
-impl fmt::Debug for Client {
+impl fmt::Debug for Network {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Client").field("options", &self.options).finish_non_exhaustive()
+        f.debug_struct("Network").field("options", &self.options).finish_non_exhaustive()
+    }
+}
+
+impl Received {
+    pub(crate) fn traffic(&self) -> Traffic {
+        Traffic { requests: self.requests.load(Ordering::Relaxed), bytes: self.bytes.load(Ordering::Relaxed) }
     }
 }
 
 impl Target {
-    pub(crate) fn new(address: Address) -> Self {
-        Self { address, moved: Mutex::new(None) }
+    pub(crate) fn new(address: Address, received: Arc<Received>) -> Self {
+        Self { address, received, moved: Mutex::new(None) }
     }
 
     fn moved(&self, set: impl FnOnce(&mut Option<Url>)) -> Option<Url> {
@@ -72,8 +86,8 @@ impl Target {
     }
 }
 
-impl Client {
-    pub(crate) fn new(options: &RemoteOptions) -> Self {
+impl Network {
+    pub(crate) fn new(options: RemoteOptions) -> Self {
         let authorities = match &options.authorities {
             Some(ders) => {
                 let certificates: Vec<_> = ders.iter().map(|der| Certificate::from_der(der).to_owned()).collect();
@@ -97,18 +111,8 @@ impl Client {
             .max_idle_connections(AT_ONCE)
             .max_idle_connections_per_host(AT_ONCE)
             .build();
-        Self {
-            agent: config.new_agent(),
-            options: options.clone(),
-            gate: Arc::default(),
-            answered: AtomicBool::new(false),
-            requests: AtomicU64::new(0),
-            bytes: AtomicU64::new(0),
-        }
-    }
-
-    pub(crate) fn traffic(&self) -> Traffic {
-        Traffic { requests: self.requests.load(Ordering::Relaxed), bytes: self.bytes.load(Ordering::Relaxed) }
+        let kept = Kept::new(options.cache);
+        Self { agent: config.new_agent(), options, gate: Arc::default(), kept }
     }
 
     pub(crate) fn patience<'a>(&self, target: &'a Target, stop: &'a Stop) -> Patience<'a> {
@@ -121,9 +125,11 @@ impl Client {
         let remembered = target.moved(|_| ());
         let mut url = remembered.clone().unwrap_or_else(|| home.clone());
         for _ in 0..=MOST_REDIRECTS {
-            let mut response = self.send(&url, url.origin() == home.origin(), ask)?;
+            let at_home = url.origin() == home.origin();
+            let mut response = self.send(target, &url, at_home, ask)?;
             let (status, headers) = (response.status(), response.headers());
-            if text(headers, "x-amz-bucket-region").is_some_and(|region| target.address.set_region(region)) {
+            let region = text(headers, "x-amz-bucket-region").filter(|_| !status.is_success());
+            if region.is_some_and(|region| target.address.set_region(region)) {
                 home = target.address.url();
                 url = home.clone();
                 continue;
@@ -141,6 +147,13 @@ impl Client {
                     target.moved(|moved| *moved = None);
                     return Err(Fault::Passing("where it redirects to, it is not found".into(), Wait::None));
                 }
+                401 | 403 if !at_home && !self.options.headers.is_empty() => {
+                    let host = printable(url.host_str().unwrap_or_default());
+                    return Err(Fault::Final(format!(
+                        "it redirects to {host}, which answers {} and gets no headers; give the address there",
+                        status.as_u16()
+                    )));
+                }
                 _ => {
                     let mut body = Vec::new();
                     // It is only an explanation.
@@ -153,15 +166,18 @@ impl Client {
         Err(Fault::Final(format!("it redirects more than {MOST_REDIRECTS} times; check the address")))
     }
 
-    fn send(&self, url: &Url, at_home: bool, ask: &Ask<'_>) -> Result<Response<Body>, Fault> {
+    fn send(&self, target: &Target, url: &Url, at_home: bool, ask: &Ask<'_>) -> Result<Response<Body>, Fault> {
         let mut request = self.agent.get(url.as_str());
-        if let Some(proxy) = self.options.proxies.of(url).map_err(|variable| {
-            Fault::Final(format!("{variable} is no address of a proxy, such as http://host:8080; set it anew"))
-        })? {
-            request = request.config().proxy(Some(proxy)).build();
+        let Route { proxy, peer } = self.route(url)?;
+        if proxy.is_some() {
+            request = request.config().proxy(proxy).build();
         }
-        for header in self.options.headers.iter().filter(|_| at_home) {
-            request = request.header(&header.name, &header.value);
+        if at_home {
+            let own = target.address.authorization().filter(|_| !self.options.headers.iter().any(Header::authorizes));
+            request = own.into_iter().fold(request, |request, own| request.header("Authorization", own));
+            for header in &self.options.headers {
+                request = request.header(&header.name, &header.value);
+            }
         }
         match ask {
             Ask::Part(range, tag) => {
@@ -173,15 +189,22 @@ impl Client {
             }
             Ask::Whole => request = request.header("Accept-Encoding", "gzip"),
         }
-        self.requests.fetch_add(1, Ordering::Relaxed);
-        let response = request.call().map_err(|error| self.broken(error, url))?;
-        self.answered.store(true, Ordering::Relaxed);
+        target.received.requests.fetch_add(1, Ordering::Relaxed);
+        let response = request.call().map_err(|error| self.broken(error, target, &peer))?;
+        target.received.answers.fetch_add(1, Ordering::Relaxed);
         Ok(response)
     }
 
-    fn broken(&self, error: ureq::Error, url: &Url) -> Fault {
+    fn route(&self, url: &Url) -> Result<Route, Fault> {
+        let wrong = |variable| {
+            Fault::Final(format!("{variable} is no address of a proxy, such as http://host:8080; set it anew"))
+        };
+        self.options.proxies.route(url).map_err(wrong)
+    }
+
+    fn broken(&self, error: ureq::Error, target: &Target, peer: &str) -> Fault {
         let limits = [self.options.connect_timeout, self.options.idle_timeout];
-        Fault::of_connection(error, url, self.answered.load(Ordering::Relaxed), limits)
+        Fault::of_connection(error, peer, target.received.answers.load(Ordering::Relaxed) > 0, limits)
     }
 
     /// Appends the body of an answer to `bytes`, which keep what arrived before a fault. Whether it ended before
@@ -198,8 +221,8 @@ impl Client {
         let mut block = vec![0; BLOCK];
         loop {
             stop.check()?;
-            let read = reader.read(&mut block).map_err(|error| self.broken(error.into(), &target.address.url()))?;
-            self.bytes.fetch_add(read as u64, Ordering::Relaxed);
+            let read = reader.read(&mut block).map_err(|error| self.broken(error.into(), target, "the server"))?;
+            target.received.bytes.fetch_add(read as u64, Ordering::Relaxed);
             if read == 0 {
                 return Ok(true);
             }
@@ -211,15 +234,15 @@ impl Client {
     }
 }
 
-/// Whether the bytes of an answer are those of the file.
+/// Fails for an answer whose bytes are not those of the file.
 pub(crate) fn check_plain(response: &Response<Body>) -> Result<(), Fault> {
-    match text(response.headers(), "content-encoding") {
-        None | Some("identity" | "") => Ok(()),
+    match compression(response.headers()) {
+        None => Ok(()),
         Some(_) => Err(Fault::last("the server compresses it, so that it has no parts; have it stored as it is")),
     }
 }
 
-/// The fault of an answer that is longer than `most` bytes, if it says so.
+/// The number of bytes that an answer announces, if they are more than `most`.
 pub(crate) fn announced(response: &Response<Body>, most: u64) -> Option<u64> {
     length(response.headers()).filter(|length| *length > most)
 }
