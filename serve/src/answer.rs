@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use super::Site;
 
 /// The faults, and what each does.
-pub const FAULTS: [(&str, &str); 24] = [
+pub const FAULTS: [(&str, &str); 25] = [
     ("whole", "sends the whole file for a range"),
     ("short", "announces all bytes, sends half of them and leaves"),
     ("less", "sends the first half of what was asked for, and says so"),
@@ -23,6 +23,7 @@ pub const FAULTS: [(&str, &str); 24] = [
     ("endless", "sends bytes without an end, of unknown number"),
     ("endless-head", "sends headers without an end"),
     ("changes", "the file is another one from the second request on"),
+    ("swaps", "the same, and does not look at If-Range"),
     ("shrinks", "the file is empty from the second request on"),
     ("gzip", "says that the bytes are compressed"),
     ("moved", "redirects to another path of this host"),
@@ -96,8 +97,8 @@ impl Site {
             return plain(stream, 404, "").map(|()| true);
         };
         let size = if fault == "shrinks" && before > 0 { 0 } else { file.metadata()?.len() };
-        let tag = if fault == "changes" && before > 0 { "\"second\"" } else { "\"first\"" };
-        let asked = header("range").filter(|_| header("if-range").is_none_or(|asked| asked == tag));
+        let tag = if matches!(fault, "changes" | "swaps") && before > 0 { "\"second\"" } else { "\"first\"" };
+        let asked = header("range").filter(|_| fault == "swaps" || header("if-range").is_none_or(|asked| asked == tag));
         let Some(answer) = arranged(fault, size, tag, asked) else {
             return plain(stream, 416, &format!("Content-Range: bytes */{size}\r\n")).map(|()| true);
         };

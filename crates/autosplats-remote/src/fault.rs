@@ -100,7 +100,8 @@ impl Fault {
 }
 
 fn unknown_host(peer: &str) -> Fault {
-    Fault::Final(format!("{peer} is not found; check the address and the network"))
+    let host = peer.rsplit_once(", port").map_or(peer, |(host, _)| host);
+    Fault::Final(format!("{host} is not found; check the address and the network"))
 }
 
 fn of_system(error: &io::Error, peer: &str, answered: bool) -> Fault {

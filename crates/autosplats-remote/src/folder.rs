@@ -13,7 +13,7 @@ use crate::batch;
 use crate::content_range::{compression, length};
 use crate::fault::Fault;
 use crate::kept::Part;
-use crate::network::{Ask, Network, Received, Target, announced};
+use crate::network::{Ask, Network, Received, Target, announces_more};
 use crate::patience::Stop;
 
 /// The folder of an address.
@@ -66,7 +66,7 @@ impl Folder for RemoteFolder {
         batch::run(&self.network.gate, &self.base.folder(), missing.len(), job, progress, deliver)?;
         // What is kept may have been read with a higher limit.
         match read.iter().zip(names).find(|(bytes, _)| bytes.len() as u64 > most) {
-            Some((bytes, name)) => Err(too_large(self.base.file(name).shown(), bytes.len() as u64, most)),
+            Some((_, name)) => Err(too_large(self.base.file(name).shown(), most)),
             None => Ok(read),
         }
     }
@@ -100,13 +100,13 @@ fn try_whole(network: &Network, target: &Target, most: u64, stop: &Stop) -> Resu
             return Err(Fault::last("the server compresses it in a way that it was not asked for; tell its owner"));
         }
     };
-    if let Some(size) = announced(&response, most) {
-        return Err(too_large(shown, size, most).into());
+    if announces_more(&response, most) {
+        return Err(too_large(shown, most).into());
     }
     check_memory("a file of a tree", length(response.headers()).unwrap_or(0))?;
     let mut bytes = Vec::new();
     if !network.body(response, target, &mut bytes, most, stop)? {
-        return Err(too_large(shown, bytes.len() as u64, most).into());
+        return Err(too_large(shown, most).into());
     }
     if !compressed {
         return Ok(bytes);
@@ -114,9 +114,9 @@ fn try_whole(network: &Network, target: &Target, most: u64, stop: &Stop) -> Resu
     let mut plain = Vec::new();
     let unpacked = MultiGzDecoder::new(&bytes[..]).take(most.saturating_add(1)).read_to_end(&mut plain);
     unpacked.map_err(|_| Fault::last("what the server compressed is damaged; try again"))?;
-    if plain.len() as u64 > most { Err(too_large(shown, plain.len() as u64, most).into()) } else { Ok(plain) }
+    if plain.len() as u64 > most { Err(too_large(shown, most).into()) } else { Ok(plain) }
 }
 
-fn too_large(shown: &str, size: u64, most: u64) -> Error {
-    Error::unsupported(shown.as_ref(), format!("it has {size} bytes or more, and such a file may have {most}"))
+fn too_large(shown: &str, most: u64) -> Error {
+    Error::unsupported(shown.as_ref(), format!("it has more than the {most} bytes that such a file may have"))
 }

@@ -242,9 +242,9 @@ pub(crate) fn check_plain(response: &Response<Body>) -> Result<(), Fault> {
     }
 }
 
-/// The number of bytes that an answer announces, if they are more than `most`.
-pub(crate) fn announced(response: &Response<Body>, most: u64) -> Option<u64> {
-    length(response.headers()).filter(|length| *length > most)
+/// Whether an answer says that it has more than `most` bytes.
+pub(crate) fn announces_more(response: &Response<Body>, most: u64) -> bool {
+    length(response.headers()).is_some_and(|length| length > most)
 }
 
 fn next(url: &Url, location: Option<&str>) -> Result<Url, Fault> {

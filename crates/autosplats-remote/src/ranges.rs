@@ -9,15 +9,18 @@ use autosplats_cloud::{Error, Progress, Ranges, Traffic, check_memory, check_ran
 
 use crate::address::Address;
 use crate::batch;
-use crate::content_range::{ContentRange, Version, length};
+use crate::content_range::{ContentRange, Version, length, text};
 use crate::fault::{Fault, Wait};
 use crate::kept::Part;
-use crate::network::{Ask, Network, Target, announced, check_plain};
+use crate::network::{Ask, Network, Target, announces_more, check_plain};
 use crate::patience::Stop;
 use crate::plan::spans;
 
 /// Bytes that opening asks for.
 const HEAD: u64 = 64 << 10;
+
+/// Bytes after which tries are counted anew.
+const PROGRESS: u64 = 64 << 10;
 
 /// A file at an address.
 pub(crate) struct RemoteRanges {
@@ -144,7 +147,7 @@ impl File {
             206 => {
                 let sized = ContentRange::of(&headers).ok_or_else(unclear)?;
                 let wanted = sized.size.min(HEAD);
-                if sized.part.start != 0 || sized.part.end > wanted || announced(&response, wanted).is_some() {
+                if sized.part.start != 0 || sized.part.end > wanted || announces_more(&response, wanted) {
                     return Err(unclear());
                 }
                 if !self.network.body(response, &self.target, &mut head, wanted, stop)? {
@@ -160,7 +163,7 @@ impl File {
                         "the server sends no parts of files, and more than {most} bytes are not loaded whole; download it"
                     ))
                 };
-                if announced(&response, most).is_some()
+                if announces_more(&response, most)
                     || !self.network.body(response, &self.target, &mut head, most, stop)?
                 {
                     return Err(refuse());
@@ -168,7 +171,10 @@ impl File {
                 Ok((Version::of(&headers, head.len() as u64), head))
             }
             // An empty file has no first byte.
-            _ => Ok((Version::of(&headers, 0), head)),
+            _ if text(&headers, "content-range").is_some_and(|told| told.ends_with("*/0")) => {
+                Ok((Version::of(&headers, 0), head))
+            }
+            _ => Err(unclear()),
         }
     }
 
@@ -178,11 +184,18 @@ impl File {
         let mut bytes = Vec::with_capacity(len as usize);
         let mut patience = self.network.patience(&self.target, stop);
         while (bytes.len() as u64) < len {
-            let rest = part.start + bytes.len() as u64..part.end;
-            if let Err(fault) = self.try_part(&rest, version, &mut bytes, len, stop) {
-                patience.after(fault)?;
-            } else if (bytes.len() as u64) < len {
-                patience.after(Fault::Passing("the server sends less than was asked for".into(), Wait::None))?;
+            let had = bytes.len() as u64;
+            let rest = part.start + had..part.end;
+            let outcome = self.try_part(&rest, version, &mut bytes, len, stop);
+            if bytes.len() as u64 - had >= PROGRESS {
+                patience = self.network.patience(&self.target, stop);
+            }
+            match outcome {
+                Ok(()) if (bytes.len() as u64) < len => {
+                    patience.after(Fault::Passing("the server sends less than was asked for".into(), Wait::None))?;
+                }
+                Ok(()) => {}
+                Err(fault) => patience.after(fault)?,
             }
         }
         Ok(bytes)
@@ -208,7 +221,7 @@ impl File {
                 if sized.part.start != part.start || sized.part.end > part.end {
                     return Err(unclear());
                 }
-                if announced(&response, part.end - part.start).is_some() {
+                if announces_more(&response, part.end - part.start) {
                     return Err(unclear());
                 }
                 if self.network.body(response, &self.target, bytes, most, stop)? { Ok(()) } else { Err(unclear()) }
