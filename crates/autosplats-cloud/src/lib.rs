@@ -63,7 +63,7 @@ pub use precision::{
 };
 pub use progress::{Part, Progress};
 pub use random::Random;
-pub use ranges::{FileRanges, Folder, LocalFolder, MemoryRanges, Ranges, Traffic};
+pub use ranges::{FileRanges, Folder, LocalFolder, MemoryRanges, Ranges, Traffic, check_range};
 pub use sample::{SurfaceSamples, sample_surface};
 pub use scale::computing_scale_of;
 pub use tree::{Key, Node, Tree, TreeInfo, Wanted};
