@@ -1,22 +1,15 @@
 //! What is taken of the points of a scan that is read in parts.
 
-use std::path::Path;
-
-use autosplats_cloud::{Error, Progress, Wanted};
+use autosplats_cloud::Wanted;
 use glam::DVec3;
 use laz::DecompressionSelection;
 
 use super::{
-    Decoded, Job,
     columns::Colors,
     dimension::{Dimension, Source},
     header::Header,
-    points,
 };
-use crate::{
-    las::{self, Place},
-    read::{ReadOptions, units},
-};
+use crate::las::{self, Place};
 
 /// What is taken of the points, and how, where other parts of the same scan tell. The default takes everything.
 #[derive(Default)]
