@@ -13,6 +13,7 @@
 //! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
+mod append;
 mod axes;
 mod classes;
 mod cloud;
@@ -29,6 +30,7 @@ mod identity;
 mod memory;
 mod merge;
 mod moved;
+mod pool;
 mod precision;
 mod progress;
 mod random;
@@ -55,6 +57,7 @@ pub use glam;
 pub use guard::guard;
 pub use memory::{available_memory, check_memory};
 pub use merge::normal_matrix;
+pub use pool::{PointPool, PointRun, SLOT_POINTS, SLOT_SHIFT};
 pub use precision::{
     RelativeValues, ValueOrigin, degree_origin, residual, sampled_bounds, sampled_middle, storage_origin,
 };

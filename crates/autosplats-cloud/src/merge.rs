@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Colour of the points of a part without colours, if another part has colours.
-const GREY: [u8; 3] = [200; 3];
+pub(crate) const GREY: [u8; 3] = [200; 3];
 
 impl PointCloud {
     /// Joins clouds, each moved by its pose: an affine map of world coordinates, applied in `f64`.

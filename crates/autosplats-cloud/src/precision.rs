@@ -63,6 +63,8 @@ pub fn sampled_middle(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
 #[derive(Clone, Copy, Debug)]
 pub struct RelativeValues<'a> {
     values: &'a FieldValues,
+    /// What is subtracted from each: the origin, or zero if that has been done.
+    subtracted: f64,
     about: ValueOrigin,
 }
 
@@ -95,7 +97,12 @@ impl<'a> RelativeValues<'a> {
             }
             _ => ValueOrigin::default(),
         };
-        Self { values, about }
+        Self { values, subtracted: about.origin, about }
+    }
+
+    /// Values that are stored without their origin.
+    pub(crate) fn stored(values: &'a FieldValues, about: ValueOrigin) -> Self {
+        Self { values, subtracted: 0.0, about }
     }
 
     /// What the values are relative to.
@@ -103,12 +110,30 @@ impl<'a> RelativeValues<'a> {
         self.about
     }
 
+    /// Number of values.
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Whether there are no values.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// The value of point `index`, with the origin.
+    ///
+    /// # Panics
+    /// If `index` is not below the number of values.
+    pub fn absolute(&self, index: usize) -> f64 {
+        self.values.get(index) - self.subtracted + self.about.origin
+    }
+
     /// The value of point `index`, without the origin.
     ///
     /// # Panics
     /// If `index` is not below the number of values.
     pub fn get(&self, index: usize) -> f32 {
-        (self.values.get(index) - self.about.origin) as f32
+        (self.values.get(index) - self.subtracted) as f32
     }
 }
 

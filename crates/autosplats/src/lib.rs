@@ -33,6 +33,7 @@ mod error;
 mod fit;
 mod gpu;
 mod normals;
+mod points;
 mod project;
 mod renderer;
 mod search;
@@ -47,6 +48,7 @@ pub use camera::{Camera, Lens, Projection, ViewDirection, guess_axes};
 pub use error::{Error, MAX_SIDE};
 pub use gpu::{AdapterSummary, PassTime, adapters};
 pub use normals::{NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};
+pub use points::Points;
 pub use renderer::{
     BYTES_PER_PIXEL, Backend, Counts, Frame, PointSurfel, RadiusTrial, Reconstruction, Renderer, Settings, Timings,
     best_first_radius, shade_layers, still_supersample, usual_exposure,

@@ -20,7 +20,7 @@ pub mod framing;
 mod gltf;
 mod grid;
 mod job;
-mod las;
+pub(crate) mod las;
 mod lines;
 mod mesh;
 mod names;

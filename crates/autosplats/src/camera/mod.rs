@@ -77,6 +77,8 @@ pub(crate) struct View {
     pub(crate) margin: u32,
     /// Rotation from world to view space.
     pub(crate) view_from_world: Mat3,
+    /// Position of the eye, world coordinates.
+    pub(crate) eye: DVec3,
     /// Position of the eye relative to the cloud's origin, in world orientation.
     pub(crate) eye_local: Vec3,
     /// Pixels per unit of x/z (perspective) or of x (orthographic).
@@ -125,6 +127,7 @@ impl Camera {
             height: size[1],
             margin: 0,
             view_from_world: Mat3::from_cols(right.as_vec3(), down.as_vec3(), forward.as_vec3()).transpose(),
+            eye: self.eye,
             eye_local: (self.eye - origin).as_vec3(),
             focal_px: focal_px as f32,
             perspective,
@@ -135,6 +138,11 @@ impl Camera {
 
 #[allow(clippy::wrong_self_convention, reason = "a view is too large to be handed over for every point")]
 impl View {
+    /// The same view of points about another origin.
+    pub(crate) fn about(self, origin: DVec3) -> Self {
+        Self { eye_local: (self.eye - origin).as_vec3(), ..self }
+    }
+
     /// The same picture with a margin of `margin` pixels on every side.
     pub(crate) fn with_margin(self, margin: u32) -> Self {
         let [width, height] = self.picture_size().map(|side| side + 2 * margin);

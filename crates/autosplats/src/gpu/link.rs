@@ -92,7 +92,7 @@ pub(crate) use {constants, files, indices};
 /// Files for all stages.
 const SHARED: Library = Library {
     files: &[files!(in "../shared":
-        "density", "divide", "eigen", "frame", "groups", "half", "layers", "matters", "moved", "neighborhood",
+        "cloud_points", "density", "divide", "eigen", "frame", "groups", "half", "layers", "matters", "moved", "neighborhood",
         "noise", "orthonormal", "picture", "project_point", "put_work", "range_keys", "rank", "reproject", "round", "screen", "surfel",
     )],
     constants: &[constants![

@@ -3,15 +3,15 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
-use autosplats_cloud::PointCloud;
 use glam::Vec3;
 use rayon::iter::Either;
 use rayon::prelude::*;
 
 use super::sixteenths::{Sixteenths, half, sixteenth, sixteenths_at};
-use super::{Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints};
+use super::{Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints, SlotTable};
 use crate::camera::View;
 use crate::cancel::Cancel;
+use crate::points::Points;
 
 /// Points projected per task.
 const TASK_POINTS: usize = 16 * 1024;
@@ -43,20 +43,21 @@ impl Projector {
         &self.screen
     }
 
-    /// Projects `cloud`, which has fewer than 2³² points, for `view`.
-    pub(crate) fn project(
+    /// Projects points, whose indices are below 2³² - 1, for `view`.
+    pub(crate) fn project<'a>(
         &mut self,
-        cloud: &PointCloud,
+        points: impl Into<Points<'a>>,
         view: &View,
         rules: &ProjectRules,
         cancel: &Cancel<'_>,
     ) -> &ScreenPoints {
         let ProjectRules { k, halves, .. } = *rules;
         let Self { keys, screen } = self;
-        screen.dropped = nearest_per_pixel(cloud.positions(), view, halves, keys, &mut screen.sixteenths, cancel);
+        let points = SlotTable::new(points.into(), view);
+        screen.dropped = nearest_per_pixel(&points, view, halves, keys, &mut screen.sixteenths, cancel);
         let keys = Keys::settle(keys, view, halves);
         let spacing_px = keys.mean_spacing();
-        compact(cloud.positions(), view, &keys, spacing_px, screen);
+        compact(&points, view, &keys, spacing_px, screen);
         measure_density(screen, view, spacing_px, k);
         split(rules, view, screen);
         screen
@@ -129,7 +130,7 @@ impl<'a> Keys<'a> {
 
 /// Fills `keys` with the nearest point of each pixel or half pixel, and `sixteenths` with all points.
 fn nearest_per_pixel(
-    positions: &[[f32; 3]],
+    points: &SlotTable<'_>,
     view: &View,
     halves: bool,
     keys: &mut Vec<AtomicU64>,
@@ -143,12 +144,11 @@ fn nearest_per_pixel(
     sixteenths.clear(view);
     let sixteenths = &*sixteenths;
     let [not_finite, behind, outside] = [(); 3].map(|()| AtomicUsize::new(0));
-    positions.par_chunks(TASK_POINTS).enumerate().for_each(|(chunk, positions)| {
+    points.pieces(view, TASK_POINTS).for_each(|(first, positions, view)| {
         if cancel.is_given_up() {
             return;
         }
-        let first = (chunk * TASK_POINTS) as u32;
-        let dropped = project_chunk(positions, first, view, halves, keys, sixteenths);
+        let dropped = project_chunk(positions, first, &view, halves, keys, sixteenths);
         not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);
         behind.fetch_add(dropped.behind, Ordering::Relaxed);
         outside.fetch_add(dropped.outside, Ordering::Relaxed);
@@ -257,7 +257,7 @@ fn erase_far_second(pair: &mut [AtomicU64], view: &View) {
 }
 
 /// Lists the owners of slots in cell order.
-fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, screen: &mut ScreenPoints) {
+fn compact(cloud: &SlotTable<'_>, view: &View, keys: &Keys, spacing_px: f32, screen: &mut ScreenPoints) {
     let [width, height] = [view.width as usize, view.height as usize];
     let strip_px = ((STRIP_SPACINGS * spacing_px).round() as usize).clamp(1, 256);
     let strips = height.div_ceil(strip_px);
@@ -321,7 +321,7 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, sc
         }
         // A separate loop without branches lets reads of scattered positions wait for memory together.
         for (point, &index) in points.iter_mut().zip(&*source) {
-            point.position_view = view.to_view(positions[index as usize]).to_array();
+            point.position_view = cloud.to_view(index, view).to_array();
         }
     });
 }

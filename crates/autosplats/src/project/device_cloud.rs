@@ -1,16 +1,22 @@
-//! A cloud on the device, in chunks where one binding cannot hold it, uploaded piece by piece.
+//! A cloud or a pool on the device, in chunks where one binding cannot hold it, uploaded piece by piece.
 
-use autosplats_cloud::{PointCloud, RelativeValues};
+use std::ops::Range;
+
+use autosplats_cloud::{RelativeValues, SLOT_POINTS};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
+use super::slots::{DeviceSlot, SlotTable};
 use crate::Error;
 use crate::gpu::Gpu;
+use crate::points::Points;
 
 /// Points uploaded at a time.
 const UPLOAD_PIECE_POINTS: usize = 1 << 18;
 /// Number of staging buffers, each of one piece of positions. The host fills one while others are in transit.
 const STAGING_BUFFER_COUNT: usize = 8;
+/// Words of a [`DeviceSlot`].
+const SLOT_WORDS: usize = size_of::<DeviceSlot>() / size_of::<f32>();
 /// Buffers are reallocated when a cloud uses less than one in this many of their points.
 const SHRINK_RATIO: usize = 4;
 
@@ -44,7 +50,7 @@ impl PointValues<'_> {
     }
 }
 
-/// A chunk of points, laid out as in `shared/project_point.wgsl`.
+/// A chunk of points, laid out as in `shared/cloud_points.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ChunkUniform {
@@ -52,7 +58,10 @@ pub(crate) struct ChunkUniform {
     pub(crate) len: u32,
     /// Words of values per point.
     pub(crate) values: u32,
-    pub(crate) padding: u32,
+    /// Binary logarithm of the number of points in a slot.
+    pub(crate) slot_shift: u32,
+    /// Place of the first slot's [`DeviceSlot`] in the positions, in words.
+    pub(crate) slots: u32,
 }
 
 /// A chunk of points in buffers of its own.
@@ -61,14 +70,17 @@ pub(crate) struct Chunk {
     /// Number of points that fit.
     pub(crate) capacity: u32,
     pub(crate) uniform: wgpu::Buffer,
+    /// Positions of `capacity` points, then a [`DeviceSlot`] for each slot: passes have no binding to spare.
     pub(crate) positions: wgpu::Buffer,
     pub(crate) values: wgpu::Buffer,
 }
 
-/// A cloud's points on the device.
+/// The points of a cloud or a pool on the device.
 #[derive(Debug, Default)]
 pub(crate) struct DeviceCloud {
+    /// Number that all indices of points are below.
     points: usize,
+    slot_shift: u32,
     /// Number of points that fit.
     capacity: usize,
     /// Words of values per point.
@@ -97,29 +109,33 @@ impl DeviceCloud {
         points <= self.capacity && points >= self.capacity / SHRINK_RATIO
     }
 
-    /// Makes room for `points` points. Positions and values are lost unless the points [fit](Self::fits).
+    /// Makes room for points: all of a cloud, or as many as a pool may ever hold. Positions and values are lost unless
+    /// the points [fit](Self::fits).
     ///
     /// # Errors
     /// [`Error::DeviceMemory`] if the device has no room; the cloud is then empty.
-    pub(crate) fn resize(&mut self, gpu: &Gpu, points: usize) -> Result<(), Error> {
+    pub(crate) fn resize(&mut self, gpu: &Gpu, of: Points<'_>) -> Result<(), Error> {
+        let points = of.room();
         if !self.fits(points) {
-            // A cloud that has grown once is likely to grow again.
-            let grown = if self.capacity > 0 && points > self.capacity { points + points / 4 } else { points };
+            // A cloud that has grown once is likely to grow again. A pool never grows.
+            let grows = matches!(of, Points::Cloud(_)) && self.capacity > 0 && points > self.capacity;
+            let grown = if grows { points + points / 4 } else { points };
             *self = Self::default();
             let mut chunks = Vec::new();
-            let limits = gpu.device.limits();
-            let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
-            let longest = most / size_of::<[f32; 3]>();
+            // Chunks are made of whole slots.
+            let slot_bytes = SLOT_POINTS * size_of::<[f32; 3]>() + size_of::<DeviceSlot>();
+            let longest = gpu.most_bound() as usize / slot_bytes * SLOT_POINTS;
             for first in (0..grown).step_by(longest) {
                 let capacity = longest.min(grown - first);
                 let uniform = gpu.uniform::<ChunkUniform>("run of points")?;
-                let positions = gpu.storage::<[f32; 3]>("positions", capacity)?;
+                let words = 3 * capacity + SLOT_WORDS * capacity.div_ceil(SLOT_POINTS);
+                let positions = gpu.storage::<f32>("positions", words)?;
                 let values = gpu.storage::<u32>("values of points", 0)?;
                 chunks.push(Chunk { capacity: capacity as u32, uniform, positions, values });
             }
             (self.capacity, self.chunks) = (grown, chunks);
         }
-        self.points = points;
+        (self.points, self.slot_shift) = (points, of.slot_shift());
         self.write_uniforms(gpu);
         Ok(())
     }
@@ -141,12 +157,53 @@ impl DeviceCloud {
         Ok(())
     }
 
+    /// Ranges of indices in pieces that are uploaded at once: the chunk, the index of the first point in the chunk, and
+    /// the indices.
+    fn pieces(&self, written: &[Range<usize>]) -> impl Iterator<Item = (&Chunk, usize, Range<usize>)> {
+        let starts = self.chunks.iter().scan(0, |first, chunk| {
+            let start = *first;
+            *first += chunk.capacity as usize;
+            Some((chunk, start))
+        });
+        starts.flat_map(move |(chunk, start)| {
+            let end = start + chunk.capacity as usize;
+            written.iter().flat_map(move |range| {
+                let range = range.start.max(start)..range.end.min(end);
+                range
+                    .clone()
+                    .step_by(UPLOAD_PIECE_POINTS)
+                    .map(move |first| (chunk, first - start, first..range.end.min(first + UPLOAD_PIECE_POINTS)))
+            })
+        })
+    }
+
+    /// Writes what the next frame projects: all points of a table.
+    pub(crate) fn write_slots(&self, gpu: &Gpu, table: &SlotTable<'_>) {
+        let slots = table.on_device();
+        let mut first = 0;
+        for chunk in &self.chunks {
+            let at = first >> self.slot_shift;
+            let last = (first + chunk.capacity as usize - 1) >> self.slot_shift;
+            let mut told = slots.get(at..slots.len().min(last + 1)).unwrap_or_default().to_vec();
+            told.resize(last + 1 - at, DeviceSlot::EMPTY);
+            let place = u64::from(chunk.capacity) * size_of::<[f32; 3]>() as u64;
+            gpu.queue.write_buffer(&chunk.positions, place, bytemuck::cast_slice(&told));
+            first += chunk.capacity as usize;
+        }
+    }
+
     /// Writes the uniform of each chunk.
     fn write_uniforms(&self, gpu: &Gpu) {
         let mut first = 0;
         for chunk in &self.chunks {
             let len = chunk.capacity.min((self.points - first) as u32);
-            let told = ChunkUniform { first: first as u32, len, values: self.words as u32, padding: 0 };
+            let told = ChunkUniform {
+                first: first as u32,
+                len,
+                values: self.words as u32,
+                slot_shift: self.slot_shift,
+                slots: 3 * chunk.capacity,
+            };
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&told));
             first += len as usize;
         }
@@ -174,7 +231,7 @@ impl Uploader {
         Self { ring: Vec::new(), next: 0, packed: Vec::new() }
     }
 
-    /// Uploads positions.
+    /// Uploads the positions at `written` indices.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::DeviceMemory`], and [`Error::Cancelled`] if `report` returns false; its
@@ -182,26 +239,21 @@ impl Uploader {
     pub(crate) fn positions(
         &mut self,
         gpu: &Gpu,
-        cloud: &PointCloud,
+        positions: &[[f32; 3]],
+        written: &[Range<usize>],
         to: &DeviceCloud,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
-        let mut rest = cloud.positions();
-        let mut done = 0;
-        for chunk in &to.chunks {
-            let (positions, after) = rest.split_at(rest.len().min(chunk.capacity as usize));
-            rest = after;
-            for (piece, positions) in positions.chunks(UPLOAD_PIECE_POINTS).enumerate() {
-                let at = piece * UPLOAD_PIECE_POINTS * size_of::<[f32; 3]>();
-                self.write(gpu, &chunk.positions, at, bytemuck::cast_slice(positions))?;
-                done += positions.len();
-                report_progress(report, done, to.points)?;
-            }
+        let mut done = Done::new(written, report);
+        for (chunk, at, points) in to.pieces(written) {
+            let bytes = bytemuck::cast_slice(&positions[points.clone()]);
+            self.write(gpu, &chunk.positions, at * size_of::<[f32; 3]>(), bytes)?;
+            done.add(points.len())?;
         }
         gpu.check_lost()
     }
 
-    /// Uploads values.
+    /// Uploads the values at `written` indices.
     ///
     /// # Errors
     /// Those of [`positions`](Self::positions).
@@ -209,22 +261,18 @@ impl Uploader {
         &mut self,
         gpu: &Gpu,
         values: &PointValues<'_>,
+        written: &[Range<usize>],
         to: &DeviceCloud,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
-        let mut first = 0;
-        for chunk in to.chunks.iter().filter(|_| to.words > 0) {
-            let len = (to.points - first).min(chunk.capacity as usize);
-            for piece in (0..len).step_by(UPLOAD_PIECE_POINTS) {
-                let points = UPLOAD_PIECE_POINTS.min(len - piece);
-                let mut packed = std::mem::take(&mut self.packed);
-                packed.resize(points * to.words, 0);
-                values.pack(first + piece, &mut packed);
-                self.write(gpu, &chunk.values, piece * to.words * 4, bytemuck::cast_slice(&packed))?;
-                self.packed = packed;
-                report_progress(report, first + piece + points, to.points)?;
-            }
-            first += len;
+        let mut done = Done::new(written, report);
+        for (chunk, at, points) in to.pieces(written).filter(|_| to.words > 0) {
+            let mut packed = std::mem::take(&mut self.packed);
+            packed.resize(points.len() * to.words, 0);
+            values.pack(points.start, &mut packed);
+            self.write(gpu, &chunk.values, at * to.words * size_of::<u32>(), bytemuck::cast_slice(&packed))?;
+            self.packed = packed;
+            done.add(points.len())?;
         }
         gpu.check_lost()
     }
@@ -258,10 +306,24 @@ impl Uploader {
     }
 }
 
-/// Reports the fraction done.
-///
-/// # Errors
-/// [`Error::Cancelled`] if `report` returns false.
-fn report_progress(report: &dyn Fn(f32) -> bool, done: usize, points: usize) -> Result<(), Error> {
-    if report(done as f32 / points as f32) { Ok(()) } else { Err(Error::Cancelled) }
+/// The progress of an upload.
+struct Done<'a> {
+    points: usize,
+    of: usize,
+    report: &'a dyn Fn(f32) -> bool,
+}
+
+impl<'a> Done<'a> {
+    fn new(written: &[Range<usize>], report: &'a dyn Fn(f32) -> bool) -> Self {
+        Self { points: 0, of: written.iter().map(Range::len).sum(), report }
+    }
+
+    /// Reports that `points` more are done.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if the receiver returns false.
+    fn add(&mut self, points: usize) -> Result<(), Error> {
+        self.points += points;
+        if (self.report)(self.points as f32 / self.of as f32) { Ok(()) } else { Err(Error::Cancelled) }
+    }
 }

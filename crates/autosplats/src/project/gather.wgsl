@@ -3,8 +3,8 @@
 // Reads: a chunk of the cloud; source, pixels, counters. Writes: points, values.
 
 #import frame
+#import cloud_points
 #import groups
-#import project_point
 #import screen
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;
@@ -27,7 +27,7 @@ fn gather(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     if at >= chunk.len {
         return;
     }
-    let position_view = to_view(vec3f(positions[3u * at], positions[3u * at + 1u], positions[3u * at + 2u]));
+    let position_view = turned_to_view(from_eye(at));
     points[index] = ScreenPoint(position_view, pixels[index]);
     for (var value = 0u; value < chunk.values; value++) {
         values[chunk.values * index + value] = cloud_values[chunk.values * at + value];

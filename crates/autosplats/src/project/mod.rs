@@ -14,6 +14,8 @@
 //! A coarser grid, with about k screen points to a cell, counts points for the first search radius (§5.1). The grid
 //! also holds the nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
 //!
+//! The points come in runs, each about an origin of its own (`slots`); all that leaves the stage is in view space.
+//!
 //! Every point on the screen marks the sixteenth of its pixel that it falls into, with one bit that points there share.
 //! The splatting finds the borders of surfaces from these bits.
 
@@ -21,6 +23,7 @@ mod cpu;
 mod device_cloud;
 pub(crate) mod gpu;
 mod sixteenths;
+mod slots;
 #[cfg(test)]
 mod tests;
 
@@ -29,6 +32,7 @@ pub(crate) use cpu::Projector;
 pub(crate) use device_cloud::ChunkUniform;
 pub(crate) use device_cloud::{Chunk, DeviceCloud, PointValues, Uploader};
 pub(crate) use sixteenths::{Sixteenths, half_at};
+pub(crate) use slots::SlotTable;
 
 use bytemuck::{Pod, Zeroable};
 

@@ -4,6 +4,7 @@
 
 #import frame
 #import add_sixteenth
+#import cloud_points
 #import count_dropped
 #import groups
 #import project_point
@@ -18,9 +19,8 @@
 fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     count_dropped_clear(local);
     let index = group_index(workgroup) * LARGE_GROUP + local;
-    if index < chunk.len {
-        let at = 3u * index;
-        let projected = project_point(vec3f(positions[at], positions[at + 1u], positions[at + 2u]));
+    if is_drawn(index) {
+        let projected = project_point(from_eye(index));
         if projected.slot >= SLOT_OUTSIDE {
             count_dropped(projected.slot);
         } else {

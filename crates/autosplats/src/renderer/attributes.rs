@@ -5,6 +5,7 @@ use autosplats_cloud::{Field, PointCloud, RelativeValues};
 use super::Settings;
 use crate::Error;
 use crate::fit::orient::has_sensors;
+use crate::points::Points;
 use crate::shade::{ColorMode, class_colors};
 use crate::splat::Channels;
 
@@ -33,8 +34,9 @@ impl SplatAttributes {
     /// Attributes that `settings` need.
     ///
     /// # Errors
-    /// [`Error::MissingAttribute`] if the cloud lacks an attribute.
-    pub(super) fn new(cloud: &PointCloud, settings: &Settings) -> Result<Self, Error> {
+    /// [`Error::MissingAttribute`] if the points lack an attribute.
+    pub(super) fn new(points: Points<'_>, settings: &Settings) -> Result<Self, Error> {
+        let cloud = points.scene();
         let mode = &settings.shading.color;
         let own = cloud.colors().map(|_| ColorSource::Points);
         let colors = match mode {
@@ -59,17 +61,17 @@ impl SplatAttributes {
         Channels { color: colors.is_some(), scalar: scalar.is_some(), measures: *measures, backs: *backs }
     }
 
-    /// Colours of the points: the cloud's own, or computed from their classes.
-    pub(super) fn colors<'a>(&self, cloud: &'a PointCloud) -> Option<std::borrow::Cow<'a, [[u8; 3]]>> {
+    /// Colours of the points: their own, or computed from their classes.
+    pub(super) fn colors<'a>(&self, points: Points<'a>) -> Option<std::borrow::Cow<'a, [[u8; 3]]>> {
         match self.colors? {
-            ColorSource::Points => cloud.colors().map(Into::into),
-            ColorSource::Classes => cloud.field("Classification").map(|field| class_colors(&field.values).into()),
+            ColorSource::Points => points.colors().map(Into::into),
+            ColorSource::Classes => points.field("Classification").map(|classes| class_colors(&classes).into()),
         }
     }
 
     /// Values of the scalar field.
-    pub(super) fn scalar<'a>(&self, cloud: &'a PointCloud) -> Option<RelativeValues<'a>> {
-        cloud.field(self.scalar.as_ref()?).map(|field| RelativeValues::new(&field.values))
+    pub(super) fn scalar<'a>(&self, points: Points<'a>) -> Option<RelativeValues<'a>> {
+        points.field(self.scalar.as_ref()?)
     }
 }
 

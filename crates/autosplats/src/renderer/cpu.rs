@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use autosplats_cloud::PointCloud;
 use rayon::prelude::*;
 
 use super::attributes::SplatAttributes;
@@ -14,10 +13,11 @@ use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check};
 use crate::Error;
 use crate::adapt::{Adapter, DepthNoise, Noise};
-use crate::camera::{Camera, PlacedView, View};
+use crate::camera::{Camera, View};
 use crate::cancel::Cancel;
 use crate::fit::orient::Sensors;
 use crate::fit::{GivenPlanes, Surfels, fit, place};
+use crate::points::Points;
 use crate::project::{Projector, Round, ScreenPoints};
 use crate::search::past::Past;
 use crate::search::{Neighborhoods, SearchCounts, SearchEngine, screen_grid};
@@ -33,8 +33,8 @@ pub(super) struct CpuRenderer {
     neighborhoods: Neighborhoods,
     surfels: Surfels,
     adapter: Adapter,
-    /// Identity of the cloud that `sensors` and `depth_noise` belong to.
-    cloud_identity: Option<u64>,
+    /// Identity of the points that `sensors` and `depth_noise` belong to.
+    identity: Option<u64>,
     /// `None` until surfels of the cloud are oriented.
     sensors: Option<Sensors>,
     /// Noise of the cloud's depth cameras; `None` until a frame of the cloud is adapted.
@@ -71,37 +71,37 @@ impl CpuRenderer {
     }
 
     /// See [`Renderer::render_while`](super::Renderer::render_while). The planes in `given` replace search and fit. The
-    /// cloud comes with the length of its unit in world units.
+    /// points come with the length of their unit in world units.
     pub(super) fn render(
         &mut self,
-        (cloud, unit): (&PointCloud, f64),
+        (points, unit): (Points<'_>, f64),
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
         given: Option<GivenPlanes<'_>>,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
-        let picture = check(cloud, camera, size, settings)?;
+        let picture = check(points, camera, size, settings)?;
         let mode = match given {
             Some(_) => Mode::Given,
             None => {
                 check_engine(settings.reconstruction.engine)?;
-                Mode::of(&settings.reconstruction, cloud, &picture)
+                Mode::of(&settings.reconstruction, points, &picture)
             }
         };
         let rules = Rules::new(&settings.reconstruction, mode, size, |_, _| true);
-        let wanted = SplatAttributes::new(cloud, settings)?;
-        let (colors, linear) = (wanted.colors(cloud), linear_steps());
+        let wanted = SplatAttributes::new(points, settings)?;
+        let (colors, linear) = (wanted.colors(points), linear_steps());
         let attributes = Attributes {
             color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &linear }),
-            scalar: wanted.scalar(cloud),
+            scalar: wanted.scalar(points),
             measures: wanted.measures,
             backs: wanted.backs,
         };
         let cancel = Cancel::new(go_on);
         let mut frame = CpuFrame {
             renderer: self,
-            cloud,
+            points,
             settings,
             rules: &rules,
             given,
@@ -134,13 +134,13 @@ impl CpuRenderer {
 struct CpuFrame<'a> {
     /// The renderer, whose buffers the stages fill.
     renderer: &'a mut CpuRenderer,
-    cloud: &'a PointCloud,
+    points: Points<'a>,
     settings: &'a Settings,
     rules: &'a Rules,
     given: Option<GivenPlanes<'a>>,
     attributes: Attributes<'a>,
     cancel: &'a Cancel<'a>,
-    /// World units per unit of the cloud.
+    /// World units per unit of the points.
     unit: f64,
     /// View of the picture, without the margin.
     picture: View,
@@ -153,18 +153,13 @@ struct CpuFrame<'a> {
 }
 
 impl CpuFrame<'_> {
-    /// A view of the cloud, for later frames to look back to.
-    fn placed(&self, view: View) -> PlacedView {
-        PlacedView { view, origin: self.cloud.origin() }
-    }
-
     /// Takes leave of the last frame. From here on, only cancelling stops the frame; then there are no surfels.
     fn begin(&mut self) {
-        let [now, picture] = [self.view, self.picture].map(|view| self.placed(view));
+        let [now, picture] = [self.view, self.picture].map(|view| self.points.placed(view));
         let Self { renderer, settings, rules, .. } = self;
-        let identity = self.cloud.identity();
+        let identity = self.points.identity();
         renderer.view = None;
-        if renderer.cloud_identity.replace(identity) != Some(identity) {
+        if renderer.identity.replace(identity) != Some(identity) {
             renderer.sensors = None;
             renderer.depth_noise = None;
         }
@@ -202,13 +197,13 @@ impl CpuFrame<'_> {
     }
 
     fn project(&mut self) {
-        self.renderer.projector.project(self.cloud, &self.view, &self.rules.project, self.cancel);
+        self.renderer.projector.project(self.points, &self.view, &self.rules.project, self.cancel);
     }
 
     fn fill_cells(&mut self) {
         let CpuRenderer { projector, adapter, depth_noise, .. } = &mut *self.renderer;
         if depth_noise.is_none() {
-            let found = DepthNoise::new(self.cloud, self.cancel);
+            let found = DepthNoise::new(self.points.scene(), self.cancel);
             *depth_noise = (!self.cancel.is_given_up()).then_some(found);
         }
         adapter.begin(projector.screen(), &self.view, self.rules.project.k, self.cancel);
@@ -246,7 +241,7 @@ impl CpuFrame<'_> {
 
     fn orient(&mut self, round: Round) {
         let CpuRenderer { projector, sensors, surfels, .. } = &mut *self.renderer;
-        let sensors = sensors.get_or_insert_with(|| Sensors::new(self.cloud));
+        let sensors = sensors.get_or_insert_with(|| Sensors::new(self.points.scene()));
         sensors.orient(&mut surfels[first(projector.screen(), round)..], &self.view, self.cancel);
     }
 
@@ -301,7 +296,8 @@ impl CpuFrame<'_> {
 
     fn shade(&mut self) {
         let CpuRenderer { upward, exposure, splatter, image, last_picture, .. } = &mut *self.renderer;
-        let Self { cloud, settings: Settings { shading, all_layers, .. }, .. } = self;
+        let Self { points, settings: Settings { shading, all_layers, .. }, .. } = self;
+        let cloud = points.scene();
         let exposure = exposure.of(cloud, shading);
         let layers = splatter.last();
         let values = layers.scalar_about;
@@ -323,18 +319,18 @@ impl CpuFrame<'_> {
 
     /// Makes the frame the last one.
     fn end(self) -> Counts {
-        let [now, picture] = [self.view, self.picture].map(|view| self.placed(view));
-        let Self { renderer, cloud, settings, rules, search_counts, covered, value_range, .. } = self;
+        let [now, picture] = [self.view, self.picture].map(|view| self.points.placed(view));
+        let Self { renderer, points, settings, rules, search_counts, covered, value_range, .. } = self;
         renderer.view = Some(now.view);
         renderer.past.end();
         if rules.averaged.is_some() {
-            renderer.over_time.end(now, cloud.identity(), settings.reconstruction.clone());
-            renderer.last_picture.end(picture, cloud.identity(), settings.clone());
+            renderer.over_time.end(now, points.identity(), settings.reconstruction.clone());
+            renderer.last_picture.end(picture, points.identity(), settings.clone());
         }
         let screen = renderer.projector.screen();
         let dropped = screen.dropped;
         Counts {
-            points: cloud.len(),
+            points: points.len(),
             dropped: dropped.not_finite + dropped.behind + dropped.outside,
             not_finite: dropped.not_finite,
             behind: dropped.behind,

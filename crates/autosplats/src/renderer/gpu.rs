@@ -6,8 +6,6 @@ mod tests;
 
 use std::time::Instant;
 
-use autosplats_cloud::PointCloud;
-
 use self::prepared::{Passes, Prepared, ResidentBuffers, Shape};
 use super::attributes::{ColorSource, SplatAttributes};
 use super::exposure::Exposure;
@@ -18,14 +16,15 @@ use super::{Counts, Frame, PointSurfel, Settings, Timings, check, check_count};
 use crate::Error;
 use crate::adapt::DepthNoise;
 use crate::adapt::gpu::DepthNoiseBuffer;
-use crate::camera::{Camera, PlacedView, View};
+use crate::camera::{Camera, View};
 use crate::cancel::NEVER;
 use crate::fit::Surfel;
 use crate::fit::orient::Sensors;
 use crate::fit::orient::gpu::{sensor_buffer, write_sensors};
 use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, stage_ms};
+use crate::points::Points;
 use crate::project::gpu::{Counter, ScreenBuffers};
-use crate::project::{DeviceCloud, PointValues, Uploader};
+use crate::project::{DeviceCloud, PointValues, SlotTable, Uploader};
 use crate::search::SearchEngine;
 use crate::search::gpu::{check_engine, convergence};
 use crate::shade::gpu::{ReadPicture, ShadeUniform, check_texture, finish};
@@ -58,12 +57,16 @@ pub(super) struct GpuRenderer {
     times: Vec<PassTime>,
 }
 
-/// Identities of the clouds whose points and values are on the device.
+/// What is on the device, with the generation of the points that it is current with.
 #[derive(Debug, Default)]
 struct Resident {
-    points: Option<u64>,
-    values: Option<(u64, Option<ColorSource>, Option<String>)>,
+    /// Identity of the points.
+    points: Option<(u64, u64)>,
+    values: Option<(ResidentValues, u64)>,
 }
+
+/// Identity of the points that values belong to, and which values these are.
+type ResidentValues = (u64, Option<ColorSource>, Option<String>);
 
 impl GpuRenderer {
     /// The device, with the passes that it has compiled.
@@ -112,51 +115,59 @@ impl GpuRenderer {
     /// See [`Renderer::upload`](super::Renderer::upload).
     pub(super) fn upload(
         &mut self,
-        cloud: &PointCloud,
+        points: Points<'_>,
         settings: &Settings,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
-        check_count(cloud)?;
-        let wanted = SplatAttributes::new(cloud, settings)?;
-        self.gpu.clone().checked(|| self.make_resident(cloud, &wanted, report))?
+        check_count(points)?;
+        let wanted = SplatAttributes::new(points, settings)?;
+        self.gpu.clone().checked(|| self.make_resident(points, &wanted, report))?
     }
 
     /// Uploads what is not on the device yet. `report` receives the finished fraction.
     fn make_resident(
         &mut self,
-        cloud: &PointCloud,
+        points: Points<'_>,
         wanted: &SplatAttributes,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
         self.gpu.check_lost()?;
-        let points = Some(cloud.identity());
-        let values = Some((cloud.identity(), wanted.colors, wanted.scalar.clone()));
-        let [new_points, new_values] = [self.resident.points != points, self.resident.values != values];
-        if !new_points && !new_values {
+        let (identity, generation) = (points.identity(), points.generation());
+        let values = (identity, wanted.colors, wanted.scalar.clone());
+        let has_points = self.resident.points.filter(|(known, _)| *known == identity).map(|(_, current)| current);
+        let has_values =
+            self.resident.values.as_ref().filter(|(known, _)| *known == values).map(|&(_, current)| current);
+        if [has_points, has_values] == [Some(generation); 2] {
             return Ok(());
         }
-        let colors = wanted.colors(cloud);
-        let carried = PointValues { colors: colors.as_deref(), scalar: wanted.scalar(cloud) };
-        if !self.cloud.fits(cloud.len()) || self.cloud.words() != carried.words() {
+        let colors = wanted.colors(points);
+        let carried = PointValues { colors: colors.as_deref(), scalar: wanted.scalar(points) };
+        if !self.cloud.fits(points.room()) || self.cloud.words() != carried.words() {
             // Steps keep the buffers that they bind: the steps go before new buffers come.
             self.prepared = None;
         }
-        // Values of a failed upload do not count as resident.
-        self.resident.values = None;
         let part = if carried.words() == 0 { 1.0 } else { 0.5 };
-        if new_points {
-            self.resident.points = None;
-            self.cloud.resize(&self.gpu, cloud.len())?;
-            self.uploader.positions(&self.gpu, cloud, &self.cloud, &|done| report(part * done))?;
-            self.upload_sensors(&Sensors::new(cloud))?;
-            if self.depth_noise.write(&self.gpu, &DepthNoise::new(cloud, &NEVER))? {
+        // Of a failed upload, what was there counts as resident only if it is still wanted.
+        if has_points.is_none() {
+            self.resident = Resident::default();
+            self.cloud.resize(&self.gpu, points)?;
+            let scene = points.scene();
+            self.upload_sensors(&Sensors::new(scene))?;
+            if self.depth_noise.write(&self.gpu, &DepthNoise::new(scene, &NEVER))? {
                 self.prepared = None;
             }
-            self.resident.points = points;
         }
-        self.cloud.resize_values(&self.gpu, carried.words())?;
-        self.uploader.values(&self.gpu, &carried, &self.cloud, &|done| report(1.0 - part + part * done))?;
-        self.resident.values = values;
+        let written = points.written_since(has_points);
+        self.uploader.positions(&self.gpu, points.positions(), &written, &self.cloud, &|done| report(part * done))?;
+        self.resident.points = Some((identity, generation));
+        if has_values.is_none() {
+            self.resident.values = None;
+            self.cloud.resize_values(&self.gpu, carried.words())?;
+        }
+        let written = points.written_since(has_values);
+        let report = |done| report(1.0 - part + part * done);
+        self.uploader.values(&self.gpu, &carried, &written, &self.cloud, &report)?;
+        self.resident.values = Some((values, generation));
         Ok(())
     }
 
@@ -209,44 +220,44 @@ impl GpuRenderer {
     /// See [`Renderer::render_while`](super::Renderer::render_while).
     pub(super) fn render(
         &mut self,
-        cloud: &PointCloud,
+        points: Points<'_>,
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
         unit: f64,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
-        let view = check(cloud, camera, size, settings)?;
+        let view = check(points, camera, size, settings)?;
         // `checked` turns every failure of the device into an error.
-        self.gpu.clone().checked(move || self.frame(cloud, &view, size, settings, unit, go_on))?
+        self.gpu.clone().checked(move || self.frame(points, &view, size, settings, unit, go_on))?
     }
 
     /// Renders after the checks.
     fn frame(
         &mut self,
-        cloud: &PointCloud,
+        points: Points<'_>,
         view: &View,
         size: [u32; 2],
         settings: &Settings,
         unit: f64,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
-        let wanted = SplatAttributes::new(cloud, settings)?;
+        let wanted = SplatAttributes::new(points, settings)?;
         let started = Instant::now();
-        self.make_resident(cloud, &wanted, &|_| go_on())?;
+        self.make_resident(points, &wanted, &|_| go_on())?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
-        let rules = self.prepare(cloud, view, &wanted, settings)?;
+        let rules = self.prepare(points, view, &wanted, settings)?;
         let screen = &view.with_margin(rules.margin_px);
         let Self {
             gpu, clock, prepared, upward, exposure, view: last_view, readback, image, layers, times, frame, ..
         } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
+        let cloud = points.scene();
         let exposure = exposure.of(cloud, &settings.shading);
-        let values = wanted.scalar(cloud).map(|values| values.about()).unwrap_or_default();
+        let values = wanted.scalar(points).map(|values| values.about()).unwrap_or_default();
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        let now = (PlacedView { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
-        prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform);
+        prepared.write_uniforms(gpu, frame, (screen, points, None), &rules, settings, &uniform);
 
         let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock);
@@ -260,7 +271,7 @@ impl GpuRenderer {
         *times = recorder.finish();
         // The submitted frame replaces the surfels of the last one.
         *last_view = Some(*screen);
-        prepared.seen = Some((now.0, now.1, (settings.clone(), None)));
+        prepared.seen = Some((points.placed(*screen), points.identity(), (settings.clone(), None)));
         let (counters, value_range) = readback.read(gpu, |parts| {
             let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
             let range = [Counter::RangeLow, Counter::RangeHigh].map(|end| counters[end as usize]);
@@ -291,13 +302,13 @@ impl GpuRenderer {
             shade: stage("shade"),
             frame: frame_ms,
         };
-        Ok(Frame { image, layers, counts: Counts { value_range, ..counts(cloud, &counters) }, timings, passes: times })
+        Ok(Frame { image, layers, counts: Counts { value_range, ..counts(points, &counters) }, timings, passes: times })
     }
 
     /// See [`Renderer::render_to_texture`](super::Renderer::render_to_texture).
     pub(super) fn render_to_texture(
         &mut self,
-        cloud: &PointCloud,
+        points: Points<'_>,
         camera: &Camera,
         texture: &wgpu::Texture,
         settings: &Settings,
@@ -305,48 +316,56 @@ impl GpuRenderer {
     ) -> Result<(), Error> {
         let size = [texture.width(), texture.height()];
         check_texture(texture, size)?;
-        let view = check(cloud, camera, size, settings)?;
-        self.gpu.clone().checked(|| self.frame_in_texture(cloud, &view, texture, settings, unit))?
+        let view = check(points, camera, size, settings)?;
+        self.gpu.clone().checked(|| self.frame_in_texture(points, &view, texture, settings, unit))?
     }
 
     /// Renders into a texture after the checks.
     fn frame_in_texture(
         &mut self,
-        cloud: &PointCloud,
+        points: Points<'_>,
         view: &View,
         texture: &wgpu::Texture,
         settings: &Settings,
         unit: f64,
     ) -> Result<(), Error> {
-        let wanted = SplatAttributes::new(cloud, settings)?;
-        self.make_resident(cloud, &wanted, &|_| true)?;
-        let rules = self.prepare(cloud, view, &wanted, settings)?;
+        let wanted = SplatAttributes::new(points, settings)?;
+        self.make_resident(points, &wanted, &|_| true)?;
+        let rules = self.prepare(points, view, &wanted, settings)?;
         let screen = view.with_margin(rules.margin_px);
         let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
+        let cloud = points.scene();
         let exposure = exposure.of(cloud, &settings.shading);
-        let values = wanted.scalar(cloud).map(|values| values.about()).unwrap_or_default();
+        let values = wanted.scalar(points).map(|values| values.about()).unwrap_or_default();
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        let now = (PlacedView { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
-        prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform.into_format(texture.format()));
+        let format = texture.format();
+        let now = (&screen, points, Some(format));
+        prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform.into_format(format));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
         recorder.finish();
         *last_view = Some(screen);
-        prepared.seen = Some((now.0, now.1, (settings.clone(), now.2)));
+        prepared.seen = Some((points.placed(screen), points.identity(), (settings.clone(), Some(format))));
         gpu.check_lost()
     }
 
     /// Resolves the rules of a frame, and makes its buffers and steps unless those of the last frame fit.
     fn prepare(
         &mut self,
-        cloud: &PointCloud,
+        points: Points<'_>,
         view: &View,
         wanted: &SplatAttributes,
         settings: &Settings,
     ) -> Result<Rules, Error> {
+        if matches!((points, settings.reconstruction.engine), (Points::Pool(_), SearchEngine::KdTree { .. })) {
+            return Err(Error::Device(
+                "the kd-tree search of [ZHWG08] takes clouds that are read whole; use the screen-grid engine".into(),
+            ));
+        }
+        self.cloud.write_slots(&self.gpu, &SlotTable::new(points, view));
         let size = view.picture_size();
         // A surfel is the largest record per screen point.
         let has_room = |margin: u32, halves| {
@@ -354,7 +373,7 @@ impl GpuRenderer {
             ScreenBuffers::has_room::<Surfel>(&self.gpu, screen, halves, self.cloud.capacity())
                 && LayerBuffers::has_room(&self.gpu, screen, wanted.channels())
         };
-        let mode = Mode::of(&settings.reconstruction, cloud, view);
+        let mode = Mode::of(&settings.reconstruction, points, view);
         let rules = Rules::new(&settings.reconstruction, mode, size, has_room);
         let sensors = self.sensors.as_ref().map(|(_, len)| *len);
         let shape = Shape::new(size, &rules, sensors, wanted, settings);
@@ -371,11 +390,11 @@ impl GpuRenderer {
 }
 
 /// Counts of a frame, from the device's counters.
-fn counts(cloud: &PointCloud, counters: &[u32]) -> Counts {
+fn counts(points: Points<'_>, counters: &[u32]) -> Counts {
     let count = |counter: Counter| counters[counter as usize] as usize;
     let [not_finite, behind, outside] = [Counter::NotFinite, Counter::Behind, Counter::Outside].map(count);
     Counts {
-        points: cloud.len(),
+        points: points.len(),
         dropped: not_finite + behind + outside,
         not_finite,
         behind,

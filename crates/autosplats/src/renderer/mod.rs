@@ -24,6 +24,7 @@ use crate::camera::{Camera, View};
 use crate::fit::GivenPlanes;
 use crate::gpu::{AdapterSummary, Gpu, PassTime};
 use crate::normals::Normals;
+use crate::points::Points;
 use crate::shade::Image;
 use crate::splat::GBuffer;
 use crate::{Error, MAX_SIDE};
@@ -39,7 +40,7 @@ pub use surfels::PointSurfel;
 /// around the picture, if there is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Counts {
-    /// Points in the cloud.
+    /// Points in the cloud, or in the chosen nodes of a pool.
     pub points: usize,
     /// Points that cannot be seen: the sum of `not_finite`, `behind` and `outside`.
     pub dropped: usize,
@@ -263,22 +264,23 @@ impl Renderer {
         }
     }
 
-    /// Renders `cloud` into a picture of `size` (width, height) pixels. A GPU keeps the points of the last cloud and
-    /// does not upload a cloud of the same [identity](PointCloud::identity) again.
+    /// Renders points into a picture of `size` (width, height) pixels: a `&PointCloud`, or the chosen nodes of a
+    /// `&PointPool`. A GPU keeps the points of the last cloud or pool. It does not upload a cloud of the same
+    /// [identity](PointCloud::identity) again, and of a pool only what was inserted since.
     ///
     /// # Errors
     /// [`Error::ImageSize`], [`Error::Setting`] and [`Error::Camera`] for values outside their ranges,
-    /// [`Error::TooManyPoints`], [`Error::MissingAttribute`] if the cloud lacks the attribute of the colour mode. On a
+    /// [`Error::TooManyPoints`], [`Error::MissingAttribute`] if the points lack the attribute of the colour mode. On a
     /// GPU also [`Error::DeviceLimit`], [`Error::DeviceMemory`] and [`Error::DeviceLost`]; after the last, the renderer
-    /// is unusable.
-    pub fn render(
+    /// is unusable. [`Error::Device`] if the search engine takes no pools, as [`KdTree`](crate::SearchEngine::KdTree).
+    pub fn render<'a>(
         &mut self,
-        cloud: &PointCloud,
+        points: impl Into<Points<'a>>,
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
     ) -> Result<Frame<'_>, Error> {
-        self.render_while(cloud, camera, size, settings, &|| true)
+        self.render_while(points, camera, size, settings, &|| true)
     }
 
     /// [Renders](Self::render) unless `go_on` returns false, for example because the view has changed. The CPU calls
@@ -308,9 +310,9 @@ impl Renderer {
     /// let result = renderer.render_while(&cloud, &camera, [64, 48], &settings, &go_on);
     /// assert!(matches!(result, Err(Error::Cancelled)));
     /// ```
-    pub fn render_while(
+    pub fn render_while<'a>(
         &mut self,
-        cloud: &PointCloud,
+        points: impl Into<Points<'a>>,
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
@@ -319,7 +321,7 @@ impl Renderer {
         if !go_on() {
             return Err(Error::Cancelled);
         }
-        self.render_form(cloud, None, camera, size, settings, go_on)
+        self.render_form(points.into(), None, camera, size, settings, go_on)
     }
 
     /// Renders `cloud` with precomputed normals and radii, as [`estimate_normals`] returns them for the same `k`. CPU
@@ -366,7 +368,14 @@ impl Renderer {
         if let Some((what, given)) = lengths.into_iter().find(|&(_, given)| given != points) {
             return Err(Error::Normals { what, given, points });
         }
-        self.render_form(cloud, Some(GivenPlanes { normals, curvature, radius }), camera, size, settings, &|| true)
+        self.render_form(
+            cloud.into(),
+            Some(GivenPlanes { normals, curvature, radius }),
+            camera,
+            size,
+            settings,
+            &|| true,
+        )
     }
 
     /// Surfels of the last frame: the fits of all reconstructed points whose surfel's centre is in the picture, in no
@@ -416,24 +425,25 @@ impl Renderer {
         }
     }
 
-    /// Uploads what the next frame of `cloud` with `settings` needs, so that this frame starts at once. The upload can
+    /// Uploads what the next frame of points with `settings` needs, so that this frame starts at once. The upload can
     /// run while the device still renders the frame before. `report` receives the finished fraction, 0 to 1, and
     /// returns whether to go on. Does nothing on the CPU.
     ///
     /// # Errors
     /// [`Error::MissingAttribute`], [`Error::TooManyPoints`], [`Error::DeviceMemory`], [`Error::DeviceLost`];
     /// [`Error::Cancelled`] if `report` returned false.
-    pub fn upload(
+    pub fn upload<'a>(
         &mut self,
-        cloud: &PointCloud,
+        points: impl Into<Points<'a>>,
         settings: &Settings,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
         match &mut self.form {
             BackendRenderer::Cpu(_) => Ok(()),
             BackendRenderer::Gpu(renderer) => {
-                self.scaling.choose(cloud, None);
-                renderer.upload(self.scaling.cloud(cloud), settings, report)
+                let points = points.into();
+                self.scaling.choose(points, None);
+                renderer.upload(self.scaling.points(points), settings, report)
             }
         }
     }
@@ -461,9 +471,9 @@ impl Renderer {
     ///     renderer.render_to_texture(cloud, camera, texture, &Settings::default())
     /// }
     /// ```
-    pub fn render_to_texture(
+    pub fn render_to_texture<'a>(
         &mut self,
-        cloud: &PointCloud,
+        points: impl Into<Points<'a>>,
         camera: &Camera,
         texture: &wgpu::Texture,
         settings: &Settings,
@@ -471,27 +481,27 @@ impl Renderer {
         match &mut self.form {
             BackendRenderer::Cpu(_) => Err(Error::Device("a texture can only be rendered into on a GPU".into())),
             BackendRenderer::Gpu(renderer) => {
-                let scaling = &mut self.scaling;
-                scaling.choose(cloud, Some(camera));
+                let (points, scaling) = (points.into(), &mut self.scaling);
+                scaling.choose(points, Some(camera));
                 let (camera, settings) = (scaling.camera(camera), scaling.settings(settings));
-                renderer.render_to_texture(scaling.cloud(cloud), &camera, texture, &settings, scaling.unit())
+                renderer.render_to_texture(scaling.points(points), &camera, texture, &settings, scaling.unit())
             }
         }
     }
 }
 
 /// Checks the request and prepares the camera.
-fn check(cloud: &PointCloud, camera: &Camera, [width, height]: [u32; 2], settings: &Settings) -> Result<View, Error> {
+fn check(points: Points<'_>, camera: &Camera, [width, height]: [u32; 2], settings: &Settings) -> Result<View, Error> {
     settings.check()?;
     let sides = 1..=MAX_SIDE;
     if !sides.contains(&width) || !sides.contains(&height) {
         return Err(Error::ImageSize { width, height });
     }
-    check_count(cloud)?;
-    camera.view(cloud.origin(), [width, height])
+    check_count(points)?;
+    camera.view(points.origin(), [width, height])
 }
 
-fn check_count(cloud: &PointCloud) -> Result<(), Error> {
+fn check_count(points: Points<'_>) -> Result<(), Error> {
     // The last index marks empty pixels.
-    if cloud.len() >= u32::MAX as usize { Err(Error::TooManyPoints(cloud.len())) } else { Ok(()) }
+    if points.room() >= u32::MAX as usize { Err(Error::TooManyPoints(points.room())) } else { Ok(()) }
 }

@@ -13,12 +13,11 @@
 //! 8. A margin around the picture holds points that serve as neighbours ([`Rules::margin_px`]).
 //! 9. A cloud too small for a surface is drawn as dots ([`Mode::Dots`]).
 
-use autosplats_cloud::PointCloud;
-
 use super::Reconstruction;
 use crate::adapt::AdaptRules;
 use crate::camera::View;
 use crate::fit::{FitRules, LONGEST, MIN_SURFACE_POINTS};
+use crate::points::Points;
 use crate::project::ProjectRules;
 use crate::search::{SearchEngine, SearchRules};
 use crate::splat::{STEADY_FRAMES, TrimRules};
@@ -50,12 +49,13 @@ pub(super) enum Mode {
 }
 
 impl Mode {
-    /// Mode of a cloud without given planes in a picture.
-    pub(super) fn of(settings: &Reconstruction, cloud: &PointCloud, picture: &View) -> Self {
-        let finite = cloud.positions().iter().filter(|position| position.iter().all(|along| along.is_finite()));
+    /// Mode of points without given planes in a picture.
+    pub(super) fn of(settings: &Reconstruction, points: Points<'_>, picture: &View) -> Self {
+        let all = placed(points, picture);
+        let finite = all.filter(|(position, _)| position.iter().all(|along| along.is_finite()));
         if !settings.adaptive {
             Self::Paper
-        } else if finite.take(MIN_SURFACE_POINTS).count() == MIN_SURFACE_POINTS && !are_crowded(cloud, picture) {
+        } else if finite.take(MIN_SURFACE_POINTS).count() == MIN_SURFACE_POINTS && !are_crowded(points, picture) {
             Self::Adaptive
         } else {
             let [width, height] = picture.picture_size();
@@ -64,21 +64,28 @@ impl Mode {
     }
 }
 
+/// The positions of all points, with the view about their origins.
+fn placed(points: Points<'_>, picture: &View) -> impl Iterator<Item = ([f32; 3], View)> {
+    points.runs().into_iter().flat_map(move |run| {
+        let view = picture.about(run.origin);
+        points.positions()[run.first as usize..][..run.len as usize].iter().map(move |&position| (position, view))
+    })
+}
+
 /// Whether the points are so far away, in clusters, that many of them hit each of a handful of pixels. Such pixels have
 /// no neighbours that tell anything of a surface.
-fn are_crowded(cloud: &PointCloud, picture: &View) -> bool {
-    let positions = cloud.positions();
-    let step = positions.len().div_ceil(HIT_SAMPLES).max(1);
+fn are_crowded(points: Points<'_>, picture: &View) -> bool {
+    let step = points.len().div_ceil(HIT_SAMPLES).max(1);
     let [width, height] = picture.picture_size().map(|side| side as f32);
-    let mut points = 0;
+    let mut seen = 0;
     let mut pixels: Vec<[u32; 2]> = Vec::new();
-    for &position in positions.iter().step_by(step) {
-        let place = picture.to_view(position);
+    for (position, view) in placed(points, picture).step_by(step) {
+        let place = view.to_view(position);
         let [x, y] = picture.to_pixel(place);
         if !(place.z > picture.near && (0.0..width).contains(&x) && (0.0..height).contains(&y)) {
             continue;
         }
-        points += 1;
+        seen += 1;
         let pixel = [x as u32, y as u32];
         if !pixels.contains(&pixel) {
             pixels.push(pixel);
@@ -87,7 +94,7 @@ fn are_crowded(cloud: &PointCloud, picture: &View) -> bool {
             }
         }
     }
-    points >= MIN_CROWD * pixels.len().max(1)
+    seen >= MIN_CROWD * pixels.len().max(1)
 }
 
 /// What each stage of a frame does.
@@ -172,6 +179,7 @@ impl Rules {
 
 #[cfg(test)]
 mod tests {
+    use autosplats_cloud::PointCloud;
     use autosplats_cloud::glam::DVec3;
 
     use super::*;

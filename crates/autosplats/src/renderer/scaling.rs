@@ -2,7 +2,7 @@
 //!
 //! The stages compute with squares and higher powers of lengths in `f32`, which overflow for clouds in units of 1e10
 //! and vanish in units of 1e-12. Such a cloud is copied and multiplied by a power of two, which rounds nothing. All
-//! others are rendered as they are.
+//! others are rendered as they are, and so are pools, which take no scans of extraordinary size.
 
 use std::borrow::Cow;
 
@@ -12,6 +12,7 @@ use super::{BackendRenderer, Frame, PointSurfel, Renderer, Settings};
 use crate::Error;
 use crate::camera::{Camera, Projection};
 use crate::fit::GivenPlanes;
+use crate::points::Points;
 use crate::search::SearchEngine;
 use crate::splat::GBuffer;
 
@@ -35,9 +36,13 @@ impl Default for Scaling {
 }
 
 impl Scaling {
-    /// Chooses the factor for a frame of `cloud`. A camera that looks at an ordinary part of the world leaves an
+    /// Chooses the factor for a frame of `points`. A camera that looks at an ordinary part of the world leaves an
     /// extraordinary cloud as it is: points that are astronomically far away are many then.
-    pub(super) fn choose(&mut self, cloud: &PointCloud, camera: Option<&Camera>) {
+    pub(super) fn choose(&mut self, points: Points<'_>, camera: Option<&Camera>) {
+        let Points::Cloud(cloud) = points else {
+            *self = Self::default();
+            return;
+        };
         let identity = cloud.identity();
         let own = match self.known {
             Some((known, factor)) if known == identity => factor,
@@ -59,9 +64,9 @@ impl Scaling {
         }
     }
 
-    /// The cloud to render in place of the chosen one.
-    pub(super) fn cloud<'a>(&'a self, chosen: &'a PointCloud) -> &'a PointCloud {
-        self.copy.as_ref().filter(|_| self.factor != 1.0).unwrap_or(chosen)
+    /// The points to render in place of those chosen for.
+    pub(super) fn points<'a>(&'a self, chosen: Points<'a>) -> Points<'a> {
+        self.copy.as_ref().filter(|_| self.factor != 1.0).map_or(chosen, Points::Cloud)
     }
 
     /// World units per unit of the rendered cloud.
@@ -122,10 +127,10 @@ impl From<BackendRenderer> for Renderer {
 }
 
 impl Renderer {
-    /// Renders a cloud at an ordinary size, with planes only on the CPU.
+    /// Renders points at an ordinary size, with planes only on the CPU.
     pub(super) fn render_form(
         &mut self,
-        cloud: &PointCloud,
+        points: Points<'_>,
         given: Option<GivenPlanes<'_>>,
         camera: &Camera,
         size: [u32; 2],
@@ -133,8 +138,8 @@ impl Renderer {
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
         let Self { form, scaling } = self;
-        scaling.choose(cloud, Some(camera));
-        let (shown, camera, settings) = (scaling.cloud(cloud), scaling.camera(camera), scaling.settings(settings));
+        scaling.choose(points, Some(camera));
+        let (shown, camera, settings) = (scaling.points(points), scaling.camera(camera), scaling.settings(settings));
         let unit = scaling.unit();
         let frame = match (form, given) {
             (BackendRenderer::Cpu(renderer), Some(given)) => {

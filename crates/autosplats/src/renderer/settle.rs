@@ -1,10 +1,9 @@
 //! What the pictures of one recording share.
 
-use autosplats_cloud::PointCloud;
-
 use super::{Counts, Renderer, Settings, usual_exposure};
 use crate::Error;
 use crate::camera::Camera;
+use crate::points::Points;
 use crate::shade::ColorMode;
 
 impl Renderer {
@@ -30,21 +29,22 @@ impl Renderer {
     /// assert!(settings.shading.range.is_some_and(|[low, high]| low < high));
     /// # Ok::<(), autosplats::Error>(())
     /// ```
-    pub fn settle(
+    pub fn settle<'a>(
         &mut self,
         settings: &mut Settings,
-        cloud: &PointCloud,
+        points: impl Into<Points<'a>>,
         camera: &Camera,
         size: [u32; 2],
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), Error> {
-        settings.shading.exposure.get_or_insert_with(|| usual_exposure(cloud));
+        let points = points.into();
+        settings.shading.exposure.get_or_insert_with(|| usual_exposure(points.scene()));
         let has_no_range = matches!(settings.shading.color, ColorMode::Plain | ColorMode::Rgb | ColorMode::Normal);
         if settings.shading.range.is_none() && !has_no_range {
             let mut trial = settings.clone();
             // No later frame may be averaged with this one.
             trial.reconstruction.frames_averaged = 1;
-            settings.shading.range = self.render_while(cloud, camera, size, &trial, go_on)?.counts.range();
+            settings.shading.range = self.render_while(points, camera, size, &trial, go_on)?.counts.range();
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use crate::fit::Surfel;
 /// The disc that a visible point was drawn as: the result of search and fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct PointSurfel {
-    /// Index of the point in the cloud.
+    /// Index of the point in the cloud or [pool](autosplats_cloud::PointPool).
     pub point: u32,
     /// Unit normal in the cloud's axes. The normal faces the sensor if the cloud contains the point's
     /// [scan](autosplats_cloud::PointCloud::scans), unless the sensor or the eye looks along the surface. Otherwise,

@@ -1,6 +1,6 @@
 //! Colours of point classes.
 
-use autosplats_cloud::FieldValues;
+use autosplats_cloud::RelativeValues;
 use rayon::prelude::*;
 
 /// sRGB colours of the ASPRS standard classes 0 to 18 (LAS 1.4, table 17), after their usual look on maps.
@@ -28,8 +28,8 @@ const ASPRS: [[u8; 3]; 19] = [
 
 /// A colour for each point by its class. Classes beyond the standard ones get hues far from those of neighbouring
 /// classes.
-pub(crate) fn class_colors(classes: &FieldValues) -> Vec<[u8; 3]> {
-    (0..classes.len()).into_par_iter().map(|index| class_color(classes.get(index))).collect()
+pub(crate) fn class_colors(classes: &RelativeValues<'_>) -> Vec<[u8; 3]> {
+    (0..classes.len()).into_par_iter().map(|index| class_color(classes.absolute(index))).collect()
 }
 
 fn class_color(class: f64) -> [u8; 3] {

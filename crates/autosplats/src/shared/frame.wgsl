@@ -74,9 +74,13 @@ fn turned_to_eye(normal: vec3f, position: vec3f) -> vec3f {
 }
 
 fn to_view(position: vec3f) -> vec3f {
-    let p = position - frame.eye_local;
+    return turned_to_view(position - frame.eye_local);
+}
+
+// What is this far from the eye, in world axes, in view space.
+fn turned_to_view(from_eye: vec3f) -> vec3f {
     let m = frame.view_from_world;
-    return m[0] * p.x + m[1] * p.y + m[2] * p.z;
+    return m[0] * from_eye.x + m[1] * from_eye.y + m[2] * from_eye.z;
 }
 
 fn to_pixel(position_view: vec3f) -> vec2f {

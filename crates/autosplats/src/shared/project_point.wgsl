@@ -3,16 +3,6 @@
 #import frame
 #import half
 
-// A run of the cloud's points, in a buffer of its own.
-struct Chunk {
-    // Index in the cloud of its first point.
-    first: u32,
-    len: u32,
-    // Words of values per point: a colour, sRGB in the low three bytes, then the bits of a number.
-    values: u32,
-    padding: u32,
-}
-
 const SLOT_NOT_FINITE = 0xffffffffu;
 const SLOT_BEHIND = 0xfffffffeu;
 const SLOT_OUTSIDE = 0xfffffffdu;
@@ -25,8 +15,9 @@ struct Projected {
     sixteenths: vec2u,
 }
 
-fn project_point(position: vec3f) -> Projected {
-    let position_view = to_view(position);
+// Projects a point that is this far from the eye, in world axes.
+fn project_point(from_eye: vec3f) -> Projected {
+    let position_view = turned_to_view(from_eye);
     // Finite coordinates whose transform overflows count as not finite too.
     if !(is_finite(position_view.x) && is_finite(position_view.y) && is_finite(position_view.z)) {
         return Projected(SLOT_NOT_FINITE, 0.0, vec2u(0u));

@@ -3,7 +3,7 @@
 //! Any GPU serves, including software devices. Without one, these tests report that they check nothing; with `CI` set,
 //! they fail.
 
-mod devices;
+pub(crate) mod devices;
 mod splat_communication;
 use std::collections::HashMap;
 
@@ -20,7 +20,7 @@ const SIZE: [u32; 2] = [480, 300];
 
 /// Fraction of the pixels that may differ by more than two steps of brightness. Divisions on a device may be off in the
 /// last place, which moves a few points in ten thousand to the next pixel.
-const MAX_DIFFERENT_SHARE: f64 = 1e-3;
+pub(crate) const MAX_DIFFERENT_SHARE: f64 = 1e-3;
 
 /// Settings with one point per pixel, as on small devices and in splat communication.
 fn a_point_a_pixel() -> Settings {
@@ -29,7 +29,7 @@ fn a_point_a_pixel() -> Settings {
 }
 
 /// A generated scene with its camera.
-fn scene(name: &str, count: usize) -> (PointCloud, Camera) {
+pub(crate) fn scene(name: &str, count: usize) -> (PointCloud, Camera) {
     let (scene, _) = Scene::parse(name).expect("a scene");
     let view = scene.view();
     let projection = Projection::PerspectiveFovDeg(view.fov_degrees);
@@ -38,7 +38,7 @@ fn scene(name: &str, count: usize) -> (PointCloud, Camera) {
 }
 
 /// Fraction of the pixels that differ by more than two steps in any channel.
-fn unlike(a: &Image, b: &Image) -> f64 {
+pub(crate) fn unlike(a: &Image, b: &Image) -> f64 {
     assert_eq!([a.width, a.height], [b.width, b.height], "sizes");
     let differs = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > 2);
     a.pixels.iter().zip(&b.pixels).filter(differs).count() as f64 / a.pixels.len() as f64
@@ -341,7 +341,7 @@ fn the_frames_before_leave_no_trace() {
         let settings = Settings { reconstruction, all_layers: true, ..Settings::default() };
         for (at, (cloud, camera, size)) in frames.iter().enumerate() {
             let picture = |renderer: &mut Renderer, settings: &Settings| {
-                let frame = renderer.render(cloud, camera, *size, settings).expect("a picture");
+                let frame = renderer.render(*cloud, camera, *size, settings).expect("a picture");
                 let depths: Vec<u32> = frame.layers.depth.iter().map(|depth| depth.to_bits()).collect();
                 (frame.image.pixels.clone(), frame.counts, depths)
             };

@@ -6,7 +6,8 @@ use autosplats_cloud::glam::DVec3;
 use super::*;
 use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
-use crate::project::{PointValues, ProjectRules, Projector, ScreenPoints, Uploader};
+use crate::points::Points;
+use crate::project::{PointValues, ProjectRules, Projector, ScreenPoints, SlotTable, Uploader};
 use crate::test_clouds::{self, EYE};
 
 const K: u32 = 10;
@@ -80,19 +81,22 @@ pub(crate) fn find_work(gpu: &Gpu, screen: &ScreenBuffers) {
 }
 
 /// Projects a cloud on the device; returns the screen and the words of its sixteenths.
-fn project(
+fn project<'a>(
     gpu: &Gpu,
     passes: &ProjectPasses,
-    cloud: &PointCloud,
+    points: impl Into<Points<'a>>,
     view: &View,
     rules: &ProjectRules,
 ) -> (ScreenPoints, Vec<u32>) {
+    let points = points.into();
+    let written = points.written_since(None);
     let mut uploader = Uploader::new();
     let mut device_cloud = DeviceCloud::default();
-    device_cloud.resize(gpu, cloud.len()).expect("room");
-    uploader.positions(gpu, cloud, &device_cloud, &|_| true).expect("an upload");
-    uploader.values(gpu, &PointValues::default(), &device_cloud, &|_| true).expect("an upload");
-    let screen = ScreenBuffers::new(gpu, [view.width, view.height], rules.halves, cloud.len(), 0).expect("room");
+    device_cloud.resize(gpu, points).expect("room");
+    uploader.positions(gpu, points.positions(), &written, &device_cloud, &|_| true).expect("an upload");
+    uploader.values(gpu, &PointValues::default(), &written, &device_cloud, &|_| true).expect("an upload");
+    device_cloud.write_slots(gpu, &SlotTable::new(points, view));
+    let screen = ScreenBuffers::new(gpu, [view.width, view.height], rules.halves, points.room(), 0).expect("room");
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     let told = FrameUniform {
         halves: rules.halves.into(),

@@ -8,6 +8,7 @@ use crate::camera::{PlacedView, Reprojection, View};
 use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::fit::orient::gpu::OrientPasses;
 use crate::gpu::{FrameUniform, Gpu, Step};
+use crate::points::Points;
 use crate::project::DeviceCloud;
 use crate::project::gpu::{ProjectPasses, ScreenBuffers};
 use crate::renderer::attributes::SplatAttributes;
@@ -281,18 +282,19 @@ impl Prepared {
         &mut self,
         gpu: &Gpu,
         frame: &wgpu::Buffer,
-        (now, identity, format): (PlacedView, u64, Option<wgpu::TextureFormat>),
+        (view, points, format): (&View, Points<'_>, Option<wgpu::TextureFormat>),
         rules: &Rules,
         settings: &Settings,
         shading: &ShadeUniform,
     ) {
         let Settings { reconstruction, .. } = settings;
-        let frame_uniform = uniform(&now.view, rules, reconstruction.engine);
+        let now = points.placed(*view);
+        let frame_uniform = uniform(view, rules, reconstruction.engine);
         // New steps have no last frame to look back at. A change of k always makes new steps.
         let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.average);
-        let reprojected = past.and_then(|(past, points, made)| Some((Reprojection::new(&now, &past)?, points, made)));
-        let frame_uniform = reprojected.map_or(frame_uniform, |(past, points, made)| {
-            let same_points = points == identity;
+        let reprojected = past.and_then(|(past, known, made)| Some((Reprojection::new(&now, &past)?, known, made)));
+        let frame_uniform = reprojected.map_or(frame_uniform, |(past, known, made)| {
+            let same_points = known == points.identity();
             let (before, format_before) = &made;
             let is_alike = before.reconstruction == *reconstruction;
             let [of_same, of_others] = rules.averaged.filter(|_| is_alike).unwrap_or([1; 2]);

@@ -7,7 +7,7 @@ use autosplats::{Backend, Error, Renderer, Settings, wgpu};
 use super::*;
 
 /// A device of the caller's own, without optional features and with bindings of at most `binding` bytes.
-pub(super) fn own_device(binding: u64) -> Option<(wgpu::Device, wgpu::Queue)> {
+pub(crate) fn own_device(binding: u64) -> Option<(wgpu::Device, wgpu::Queue)> {
     own_device_with(wgpu::Features::empty(), binding)
 }
 

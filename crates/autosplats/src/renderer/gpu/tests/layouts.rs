@@ -79,7 +79,7 @@ fn mirrored() -> [Mirrored; 16] {
             },
             filled up with padding
         ),
-        mirrored!("Chunk", ChunkUniform { first, len, values, padding }),
+        mirrored!("Chunk", ChunkUniform { first, len, values, slot_shift, slots }),
         mirrored!("Arguments", Arguments { points, queries, clear, boxes, last_clear, last_boxes, count, iterations }),
         mirrored!("Cover", Cover { weight, rim, point, scalar }),
         mirrored!("Sensor", Sensor { position, first }),

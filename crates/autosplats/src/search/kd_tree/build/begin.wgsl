@@ -3,9 +3,9 @@
 // Reads: the cloud, which is one chunk. Writes: points, radii, large, state, arguments. One invocation per point.
 
 #import frame
+#import cloud_points
 #import groups
 #import kd_build
-#import project_point
 #import put_work
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;

@@ -6,6 +6,7 @@ use autosplats_cloud::glam::DVec3;
 use super::*;
 use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
+use crate::points::Points;
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{DeviceCloud, ProjectRules, Projector, ScreenPoints, Uploader};
@@ -48,8 +49,9 @@ fn find(gpu: &Gpu, passes: &KdTreePasses, positions: &[[f32; 3]], view: &View, k
     let screen: ScreenPoints =
         Projector::default().project(&cloud, view, &ProjectRules::usual(k), &crate::cancel::NEVER).clone();
     let mut device_cloud = DeviceCloud::default();
-    device_cloud.resize(gpu, cloud.len()).expect("room");
-    Uploader::new().positions(gpu, &cloud, &device_cloud, &|_| true).expect("an upload");
+    device_cloud.resize(gpu, Points::Cloud(&cloud)).expect("room");
+    let all = Points::Cloud(&cloud).written_since(None);
+    Uploader::new().positions(gpu, cloud.positions(), &all, &device_cloud, &|_| true).expect("an upload");
     let uploaded = upload_screen(gpu, &screen, view);
     let neighborhoods = gpu.storage::<[f32; 12]>("neighbourhoods", uploaded.capacity as usize).expect("room");
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");

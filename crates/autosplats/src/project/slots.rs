@@ -1,0 +1,79 @@
+//! Where the eye is, as seen from the origin of each point.
+//!
+//! Points have origins of their own in runs that lie in slots: powers of two of successive indices. A shift of an index
+//! finds its slot. The eye about each slot's origin is found in `f64` once a frame; everything after projection is in
+//! view space.
+
+use autosplats_cloud::{PointRun, SLOT_SHIFT};
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::camera::View;
+use crate::points::Points;
+
+/// The points of a frame by slots.
+#[derive(Debug)]
+pub(crate) struct SlotTable<'a> {
+    positions: &'a [[f32; 3]],
+    runs: Vec<PointRun>,
+    shift: u32,
+    /// Eye about the origin of each slot.
+    eyes: Vec<Vec3>,
+}
+
+/// What the device knows of a slot: four numbers behind the positions, read in `shared/cloud_points.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct DeviceSlot {
+    /// Eye about the slot's origin.
+    eye: [f32; 3],
+    /// Number of points to project, from the first on. In `f32`, because bits of small integers are no normal numbers.
+    len: f32,
+}
+
+impl DeviceSlot {
+    /// A slot without points to project.
+    pub(super) const EMPTY: Self = Self { eye: [0.0; 3], len: 0.0 };
+}
+
+impl<'a> SlotTable<'a> {
+    /// The points, as the eye of `view` sees them.
+    pub(crate) fn new(points: Points<'a>, view: &View) -> Self {
+        let (shift, runs) = (points.slot_shift(), points.runs());
+        let slots = runs.iter().map(|run| (run.first >> shift) as usize + 1).max().unwrap_or(0);
+        let mut eyes = vec![Vec3::ZERO; slots];
+        runs.iter().for_each(|run| eyes[(run.first >> shift) as usize] = view.about(run.origin).eye_local);
+        Self { positions: points.positions(), runs, shift, eyes }
+    }
+
+    /// Position in view space of the point at an index.
+    #[inline(always)]
+    pub(super) fn to_view(&self, index: u32, view: &View) -> Vec3 {
+        let eye = self.eyes[(index >> self.shift) as usize];
+        view.view_from_world * (Vec3::from(self.positions[index as usize]) - eye)
+    }
+
+    /// The points in pieces of at most `most`: index of the first, positions, and the view about their origin.
+    pub(super) fn pieces(&self, view: &View, most: usize) -> impl ParallelIterator<Item = (u32, &'a [[f32; 3]], View)> {
+        let pieces = self.runs.iter().flat_map(|run| {
+            let seen = view.about(run.origin);
+            let (first, len) = (run.first as usize, run.len as usize);
+            (0..len).step_by(most).map(move |at| (first + at..first + len.min(at + most), seen))
+        });
+        let pieces: Vec<_> = pieces.collect();
+        let positions = self.positions;
+        pieces.into_par_iter().map(move |(piece, seen)| (piece.start as u32, &positions[piece], seen))
+    }
+
+    /// The slots for the device.
+    pub(super) fn on_device(&self) -> Vec<DeviceSlot> {
+        let mut slots = vec![DeviceSlot::EMPTY; self.eyes.len()];
+        for run in &self.runs {
+            let slot = (run.first >> self.shift) as usize;
+            // A whole cloud ends where its chunks do.
+            let len = if self.shift == SLOT_SHIFT { run.len as f32 } else { f32::MAX };
+            slots[slot] = DeviceSlot { eye: self.eyes[slot].to_array(), len };
+        }
+        slots
+    }
+}
