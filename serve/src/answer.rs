@@ -150,6 +150,7 @@ fn arranged(fault: &str, size: u64, tag: &str, asked: Option<&str>) -> Option<An
     let part = match fault {
         "less" => range.start..range.end - (range.end - range.start) / 2,
         "more" => range.start..size,
+        "shifted" if range.start > 0 => range.start - 1..range.end - 1,
         "shifted" => range.start + 1..range.end,
         _ => range,
     };

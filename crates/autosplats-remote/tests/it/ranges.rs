@@ -48,6 +48,9 @@ fn opening_is_one_request_and_its_bytes_are_kept() {
     }
     let after = file.traffic();
     assert_eq!(after.requests, 4, "two are near each other");
+    let heads: Vec<String> = site.server.heads().iter().map(|head| head.to_lowercase()).collect();
+    assert!(heads[0].contains("range: bytes=0-65535\r\n") && !heads[0].contains("if-range"), "{}", heads[0]);
+    assert!(heads[1..].iter().all(|head| head.contains("if-range: \"first\"\r\n")), "of the version that was opened");
     assert_eq!(file.read(&ranges, &()).unwrap(), read, "the same bytes again");
     assert_eq!(file.traffic(), after, "from memory");
     let counts = site.server.counts();
@@ -170,7 +173,9 @@ fn many_ranges_share_the_delay() {
     let read = file.read(&ranges, &()).unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let traffic = file.traffic();
-    println!("{} requests, {} bytes, {seconds:.2} s", traffic.requests, traffic.bytes);
+    let connections = server.counts().connections;
+    println!("{} requests, {} bytes, {connections} connections, {seconds:.2} s", traffic.requests, traffic.bytes);
+    assert!(connections <= 13, "{connections} connections");
     assert!(read.iter().all(|bytes| bytes.len() == 100_000), "all of them");
     assert_eq!(traffic, Traffic { requests: 201, bytes: 65_536 + 200 * 100_000 });
     assert!(seconds < 5.0, "one after the other it takes 10 s: {seconds:.2} s");
