@@ -1,13 +1,16 @@
-//! Files behind addresses: octrees are read in parts, all else whole.
+//! Files behind addresses, and octrees: these are read in parts, all else whole.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use autosplats_cloud::{Error, PointCloud, Progress, Tree};
-use autosplats_formats::ReadOptions;
+use autosplats_cloud::{Error, PointCloud, Progress, Tree, Wanted};
+use autosplats_formats::{Part, ReadOptions, open_tree as open_local, read_part, read_with};
 
 /// Ways to reach a file, each the beginning of an address.
 const SCHEMES: [&str; 5] = ["http://", "https://", "s3://", "gs://", "az://"];
+
+/// Name of the file that describes an octree of many files.
+const EPT: &str = "ept.json";
 
 /// Whether a name is the address of a file.
 pub(crate) fn is_address(name: &str) -> bool {
@@ -26,10 +29,39 @@ pub(crate) fn short_name(address: &str) -> String {
     path.rsplit('/').next().unwrap_or(path).into()
 }
 
+/// Whether a path is a folder of EPT, or the file that describes one.
+pub(crate) fn is_ept(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name == EPT) || path.join(EPT).is_file()
+}
+
+/// Reads a local file whole.
+pub(crate) fn read_file(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
+    // Other octrees are read whole as files, which is faster.
+    match is_ept(path).then(|| open_local(path, progress)).transpose()?.flatten() {
+        Some(tree) => read_tree(&*tree, &Part::default(), options, progress),
+        None => read_with(path, options, progress),
+    }
+}
+
+/// Reads the part of an octree that options ask for.
+///
+/// # Errors
+/// Those of [`read_part`].
+pub fn read_tree(
+    tree: &dyn Tree,
+    part: &Part,
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<PointCloud, Error> {
+    let part = Part { keep_no_returns: options.keep_no_returns, ..part.clone() };
+    let wanted = Wanted { colors: true, exact: options.exact, keep: options.keep.clone(), ..Wanted::default() };
+    read_part(tree, &part, &wanted, progress)
+}
+
 #[cfg(feature = "http")]
 mod open {
-    use autosplats_cloud::{Ranges, Wanted, check_memory};
-    use autosplats_formats::{open_ept_in, open_tree_in, read_bytes, read_part};
+    use autosplats_cloud::{Ranges, check_memory};
+    use autosplats_formats::{open_ept_in, open_tree_in, read_bytes};
     use autosplats_remote::{Client, Header, RemoteOptions};
 
     use super::*;
@@ -47,7 +79,7 @@ mod open {
         };
         let headers = options.headers.iter().map(header).collect::<Result<_, _>>()?;
         let client = Client::new(RemoteOptions { headers, ..RemoteOptions::from_environment() });
-        if path(address).ends_with("/ept.json") {
+        if path(address).rsplit('/').next() == Some(EPT) {
             return Ok(Found::Tree(open_ept_in(client.open_folder(address)?, progress)?));
         }
         let ranges = client.open(address, progress)?;
@@ -70,11 +102,7 @@ mod open {
 
     pub(crate) fn read(address: &str, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
         match find(address, options, progress)? {
-            Found::Tree(tree) => {
-                let (exact, keep) = (options.exact, options.keep.clone());
-                let wanted = Wanted { colors: true, exact, keep, ..Wanted::default() };
-                read_part(&*tree, None, None, &wanted, progress)
-            }
+            Found::Tree(tree) => read_tree(&*tree, &Part::default(), options, progress),
             Found::Other(ranges) => {
                 check_memory("a remote file", ranges.size())?;
                 let bytes = ranges.read(&[0..ranges.size(), 0..0], progress)?.swap_remove(0);
@@ -93,11 +121,7 @@ mod open {
         Err(Error::Remote { address: path(address).into(), what })
     }
 
-    pub(crate) fn open_tree(
-        address: &str,
-        _: &ReadOptions,
-        _: &dyn Progress,
-    ) -> Result<Option<Arc<dyn Tree>>, Error> {
+    pub(crate) fn open_tree(address: &str, _: &ReadOptions, _: &dyn Progress) -> Result<Option<Arc<dyn Tree>>, Error> {
         refused(address)
     }
 

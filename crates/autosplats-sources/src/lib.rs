@@ -29,6 +29,7 @@ mod stream;
 mod transforms;
 mod wire;
 
+pub use address::read_tree;
 pub use align::beginnings;
 pub use animation::{Animation, Playback};
 pub use input::Input;

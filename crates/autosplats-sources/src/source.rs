@@ -7,7 +7,7 @@ use std::{
 };
 
 use autosplats_cloud::{Error, PointCloud, Progress, Tree};
-use autosplats_formats::{ReadOptions, colors_beside, open_tree, read_mesh, read_with};
+use autosplats_formats::{ReadOptions, colors_beside, open_tree, read_mesh};
 use autosplats_scenes::{SCENE_PREFIX, Scene};
 
 #[cfg(feature = "zenoh")]
@@ -119,6 +119,7 @@ impl Source {
     /// - `-` is standard input.
     /// - A path that [`is_recording`](crate::is_recording) accepts is a recording: `.mcap`, `.bag`, `.db3`, or the
     ///   folder of a ROS 2 bag.
+    /// - A folder with a file `ept.json` is one scan.
     /// - Any other folder, and a pattern with `*` or `?` that is not itself a path, is a sequence.
     /// - Anything else is a file, which need not exist.
     ///
@@ -137,6 +138,8 @@ impl Source {
             Ok(Self::Address(name.into()))
         } else if is_recording(path) {
             Ok(Self::Recording(path.into()))
+        } else if address::is_ept(path) {
+            Ok(Self::File(path.into()))
         } else if path.is_dir() || name.contains(['*', '?']) && !path.exists() {
             Ok(Self::Sequence(name.into()))
         } else {
@@ -203,7 +206,7 @@ impl Source {
     pub fn read(&self, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
         self.check_filter(options)?;
         match self {
-            Self::File(path) => read_with(path, options, progress),
+            Self::File(path) => address::read_file(path, options, progress),
             Self::Address(address) => address::read(address, options, progress),
             Self::Scene(scene, count) => scene.sample(*count, progress),
             moving => {

@@ -12,6 +12,7 @@ use autosplats_output::PictureFormat;
 
 use super::camera::CameraJob;
 use super::film::FilmJob;
+use super::path::CameraPath;
 use crate::args::{LookArgs, RenderArgs, SurfaceArgs, TreeArgs};
 use crate::choices::Map;
 use crate::console::Console;
@@ -37,6 +38,8 @@ pub(super) struct Job {
     /// Whether the factor is the default.
     pub(super) supersample_is_default: bool,
     pub(super) camera: CameraJob,
+    /// Views to fly through.
+    pub(super) path: Option<CameraPath>,
     pub(super) settings: Settings,
     pub(super) backend: Backend,
     pub(super) first_radius: FirstRadius,
@@ -58,6 +61,8 @@ impl Job {
             watch,
             tree,
             camera,
+            camera_path,
+            duration,
             surface,
             look,
             run: _,
@@ -99,7 +104,8 @@ impl Job {
         let save_camera = camera.save_camera.clone();
         let inputs = Inputs::new(&inputs, &input)?.for_pictures();
         let camera = CameraJob::new(&camera, console)?;
-        let read_files = inputs.files(camera.file());
+        let path = CameraPath::new(&camera_path, duration, console)?;
+        let read_files = inputs.files(camera.file().into_iter().chain(camera_path.iter().map(PathBuf::as_path)));
         let targets = pictures.iter().map(|picture| &picture.path).chain(&named).chain(&save_camera);
         let mut seen = HashSet::new();
         for target in targets {
@@ -131,6 +137,7 @@ impl Job {
             supersample,
             supersample_is_default,
             camera,
+            path,
             settings,
             backend,
             first_radius,
@@ -172,14 +179,15 @@ impl Job {
     }
 
     /// Fixes what all pictures share, by the first of them.
-    pub(super) fn settle(
+    pub(super) fn settle<'p>(
         &mut self,
         renderer: &mut Renderer,
-        cloud: &PointCloud,
+        points: impl Into<Points<'p>>,
         camera: &Camera,
     ) -> Result<(), Failure> {
-        let mut settings = self.settings_for(cloud);
-        renderer.settle(&mut settings, cloud, camera, self.rendered_size(), &self.console.goes_on())?;
+        let points = points.into();
+        let mut settings = self.settings_for(points);
+        renderer.settle(&mut settings, points, camera, self.rendered_size(), &self.console.goes_on())?;
         self.settings.shading = settings.shading;
         Ok(())
     }

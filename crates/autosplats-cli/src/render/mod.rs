@@ -2,9 +2,11 @@
 
 mod camera;
 mod film;
+mod flight;
 mod job;
 mod live;
 mod moving;
+mod path;
 mod pictures;
 mod placement;
 mod report;
@@ -35,6 +37,9 @@ pub(crate) fn run(args: RenderArgs, console: &Console) -> Result<(), Failure> {
     let mut renderer = Renderer::with_backend(job.backend)?;
     renderer.check(&job.settings)?;
     let device = Device::of(&renderer);
+    if job.path.is_some() {
+        return flight::run(job, film, &mut renderer, &device);
+    }
     if let Some(film) = film {
         return render_frames(&mut job, &film, &mut renderer, &device);
     }
