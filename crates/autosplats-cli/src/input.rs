@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use autosplats::PlacedTree;
 use autosplats_cloud::glam::{DMat4, DVec3};
 use autosplats_cloud::{Error, PointCloud, PointFilter, Progress, check_memory, sample_surface};
 use autosplats_formats::{ReadOptions, read_mesh};
@@ -25,6 +26,9 @@ use crate::progress::{Bar, InputProgress};
 const MAX_LISTED_NAMES: usize = 10;
 /// Gap between two inputs, in sizes of the larger one, above which a picture of both shows each as a few pixels.
 const MAX_GAP_SIZES: f64 = 200.0;
+
+/// Files of fewer points are read whole, since that takes no longer than choosing.
+const MIN_TREE_POINTS: u64 = 20_000_000;
 
 /// The inputs of one command. All files exist.
 #[derive(Debug)]
@@ -53,10 +57,11 @@ impl PlayingArgs {
 impl ReadingArgs {
     /// The options for the library.
     pub(crate) fn options(&self) -> ReadOptions {
-        let Self { columns, depth_camera, keep, keep_no_returns } = self;
+        let Self { columns, depth_camera, keep, headers, keep_no_returns } = self;
         ReadOptions {
             columns: columns.clone(),
             keep: keep.clone(),
+            headers: headers.clone(),
             depth_camera: *depth_camera,
             keep_no_returns: *keep_no_returns,
             ..ReadOptions::default()
@@ -182,6 +187,32 @@ impl Inputs {
                 input.source.read(&input.options, progress)
             }
         })
+    }
+
+    /// Opens the inputs as octrees, with their poses. `None` if they are to be read whole: one of them is no octree, or
+    /// all are files with few points and `always` is not set.
+    pub(crate) fn trees(&self, always: bool, console: &Console) -> Result<Option<Vec<PlacedTree>>, Failure> {
+        let open = |input: &Input| {
+            let bar = Bar::on_file("opening", Path::new(&input.name), console);
+            if is_made(input) {
+                return Ok(None);
+            }
+            let tree = input.source.open_tree(&input.options, &bar).map_err(|error| failure(input, error))?;
+            Ok(tree.map(|tree| PlacedTree { tree, world_from_tree: input.world_from_input }))
+        };
+        let trees: Vec<Option<PlacedTree>> = self.list.iter().map(open).collect::<Result<_, Failure>>()?;
+        let Some(trees) = trees.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
+        let points: u64 = trees.iter().map(|placed| placed.tree.info().points).sum();
+        let is_near = self.list.iter().all(|input| input.source.path().is_some());
+        if is_near && points < MIN_TREE_POINTS && !always {
+            return Ok(None);
+        }
+        Ok(Some(trees))
+    }
+
+    /// What the trees of these inputs shall give.
+    pub(crate) fn kept(&self) -> Option<PointFilter> {
+        self.list[0].options.keep.clone()
     }
 
     /// Prepares the inputs for playing, with their poses. If `watched`, files and folders are followed as they change.
@@ -445,6 +476,7 @@ fn task(input: &Input) -> String {
         }
         Source::Scene(..) => format!("generating {}", input.name),
         Source::Sequence(_) | Source::Recording(_) | Source::StandardInput => format!("reading {}", input.name),
+        Source::Address(_) => format!("fetching {}", input.name),
         Source::Remote(_) => format!("waiting for {}", input.name),
     }
 }

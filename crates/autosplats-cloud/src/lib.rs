@@ -66,4 +66,4 @@ pub use random::Random;
 pub use ranges::{FileRanges, Folder, LocalFolder, MemoryRanges, Ranges, Traffic, check_range};
 pub use sample::{SurfaceSamples, sample_surface};
 pub use scale::computing_scale_of;
-pub use tree::{Key, Node, Tree, TreeInfo, Wanted};
+pub use tree::{Key, Node, NodeKey, Tree, TreeInfo, Wanted};

@@ -63,6 +63,22 @@ impl fmt::Display for Key {
     }
 }
 
+/// A node of one of several trees. Keys are ordered by level, so that sorted ones go from coarse to fine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeKey {
+    /// Place of the node in its tree.
+    pub key: Key,
+    /// Index of the tree.
+    pub tree: u32,
+}
+
+impl From<Key> for NodeKey {
+    /// A node of the first tree.
+    fn from(key: Key) -> Self {
+        Self { key, tree: 0 }
+    }
+}
+
 /// What is known of a place in a [`Tree`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Node {

@@ -10,6 +10,7 @@
 //! # Ok::<(), autosplats_cloud::Error>(())
 //! ```
 
+mod address;
 mod align;
 mod animation;
 mod clock;

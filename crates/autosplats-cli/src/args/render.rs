@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::input::INPUT_HELP;
-use super::{CameraArgs, InputArgs, LookArgs, RunArgs, SurfaceArgs};
+use super::{CameraArgs, InputArgs, LookArgs, RunArgs, SurfaceArgs, TreeArgs};
 use crate::exit::EXIT_CODES;
 use crate::values::{self, FrameRange};
 
@@ -22,6 +22,8 @@ Examples:
   producer | autosplats render - -o live_%05d.png
   autosplats render scene:figure --scan 4 --color k-radius --range 0.01..0.03 --legend -o scanned_%03d.png
   autosplats render scene:cathedral:10M -o cathedral.png --occlusion 2 --json
+  autosplats render survey.copc.laz -o survey.png --detail 2 --memory 1G
+  autosplats render https://example.org/survey.copc.laz -o survey.png
   autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json
 
 Layers of an .exr file, 32-bit floats except the whole-number index:
@@ -58,6 +60,8 @@ pub(crate) struct RenderArgs {
     /// number
     #[arg(long, help_heading = "Points that move")]
     pub(crate) watch: bool,
+    #[command(flatten)]
+    pub(crate) tree: TreeArgs,
     #[command(flatten)]
     pub(crate) camera: CameraArgs,
     #[command(flatten)]

@@ -4,15 +4,15 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use autosplats::{
-    BYTES_PER_PIXEL, Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Reconstruction, Renderer,
-    Settings, Shading, still_supersample, usual_exposure,
+    BYTES_PER_PIXEL, Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Points, Reconstruction,
+    Renderer, Settings, Shading, still_supersample, usual_exposure,
 };
 use autosplats_cloud::{PointCloud, check_memory};
 use autosplats_output::PictureFormat;
 
 use super::camera::CameraJob;
 use super::film::FilmJob;
-use crate::args::{LookArgs, RenderArgs, SurfaceArgs};
+use crate::args::{LookArgs, RenderArgs, SurfaceArgs, TreeArgs};
 use crate::choices::Map;
 use crate::console::Console;
 use crate::exit::{Exit, Failure, suggest};
@@ -24,6 +24,8 @@ use crate::values::{COLOR_MODES, FirstRadius};
 /// A picture to render: everything except the points.
 pub(super) struct Job {
     pub(super) inputs: Inputs,
+    /// How much of octrees is read.
+    pub(super) tree: TreeArgs,
     pub(super) pictures: Vec<Picture>,
     pub(super) save_camera: Option<PathBuf>,
     /// Input files, which must not be overwritten.
@@ -54,6 +56,7 @@ impl Job {
             frames,
             resume,
             watch,
+            tree,
             camera,
             surface,
             look,
@@ -120,6 +123,7 @@ impl Job {
         }
         let job = Self {
             inputs,
+            tree,
             pictures,
             save_camera,
             read_files,
@@ -155,15 +159,16 @@ impl Job {
         Ok(())
     }
 
-    /// Renders a cloud of any number of points, also none.
-    pub(super) fn render<'a>(
+    /// Renders any number of points, also none.
+    pub(super) fn render<'a, 'p>(
         &self,
         renderer: &'a mut Renderer,
-        cloud: &PointCloud,
+        points: impl Into<Points<'p>>,
         camera: &Camera,
     ) -> Result<Frame<'a>, Failure> {
-        let (size, settings) = (self.rendered_size(), self.settings_for(cloud));
-        Ok(renderer.render_while(cloud, camera, size, &settings, &self.console.goes_on())?)
+        let points = points.into();
+        let (size, settings) = (self.rendered_size(), self.settings_for(points));
+        Ok(renderer.render_while(points, camera, size, &settings, &self.console.goes_on())?)
     }
 
     /// Fixes what all pictures share, by the first of them.
@@ -179,14 +184,15 @@ impl Job {
         Ok(())
     }
 
-    /// The settings for a cloud of any number of points, also none. No point has more neighbours than there are others.
-    fn settings_for(&self, cloud: &PointCloud) -> Settings {
+    /// The settings for any number of points, also none. No point has more neighbours than there are others.
+    fn settings_for<'p>(&self, points: impl Into<Points<'p>>) -> Settings {
+        let points = points.into();
         let mut settings = self.settings.clone();
-        if cloud.is_empty() {
+        if points.is_empty() {
             // An empty cloud has no colours; the picture shows the background.
             settings.shading.color = ColorMode::Plain;
         }
-        settings.reconstruction.k = settings.reconstruction.k.min(cloud.len().saturating_sub(1).max(1) as u32);
+        settings.reconstruction.k = settings.reconstruction.k.min(points.len().saturating_sub(1).max(1) as u32);
         settings
     }
 

@@ -37,7 +37,7 @@ mod sensor;
 mod stl;
 pub mod table;
 mod text;
-mod units;
+pub(crate) mod units;
 mod unpack;
 mod xyz;
 

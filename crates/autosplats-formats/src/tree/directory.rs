@@ -1,6 +1,7 @@
 //! The known part of a hierarchy: nodes, and pages that are not loaded.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::{PoisonError, RwLock};
 
 use autosplats_cloud::{Key, Node};
@@ -42,8 +43,20 @@ impl Directory {
         }
     }
 
+    /// The pages that are to be loaded to know the next of `keys`, each once, with their places.
+    pub(super) fn pages(&self, keys: &[Key]) -> Vec<(Key, Range<u64>)> {
+        let page = |&key: &Key| match self.nearest(key) {
+            Some((page, Entry::Page { offset, bytes })) => Some((page, offset..offset + u64::from(bytes))),
+            _ => None,
+        };
+        let mut pages: Vec<_> = keys.iter().filter_map(page).collect();
+        pages.sort_unstable_by_key(|&(key, _)| key);
+        pages.dedup();
+        pages
+    }
+
     /// The entry of the key, or of the deepest known node above.
-    pub(super) fn nearest(&self, key: Key) -> Option<(Key, Entry)> {
+    fn nearest(&self, key: Key) -> Option<(Key, Entry)> {
         let entries = self.0.read().unwrap_or_else(PoisonError::into_inner);
         let mut at = Some(key);
         while let Some(key) = at {

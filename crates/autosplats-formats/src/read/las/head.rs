@@ -27,6 +27,8 @@ pub(crate) struct Decoded {
     pub(crate) cloud: PointCloud,
     /// How many colour values lie where.
     pub(crate) levels: Levels,
+    /// Number of further points that are stated but cannot be decoded.
+    pub(crate) lost: u64,
 }
 
 /// Header and records of a compressed file in layers.
@@ -133,8 +135,8 @@ impl Head {
         outcomes.pop().unwrap_or(Ok(())).map_err(fail)?;
         let levels = columns.levels();
         let (cloud, _) = columns.into_cloud()?;
-        let mut cloud = cloud.with_crs(self.crs.clone()).with_resolution(self.header.scale.abs());
-        units::settle(&job, &mut cloud)?;
-        Ok(Decoded { cloud, levels })
+        let cloud = cloud.with_crs(self.crs.clone()).with_resolution(self.header.scale.abs());
+        let cloud = units::settled(name, cloud)?;
+        Ok(Decoded { cloud, levels, lost: 0 })
     }
 }

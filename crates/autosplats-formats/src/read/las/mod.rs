@@ -29,7 +29,7 @@ pub(crate) use self::{
     chunks::MAX_RATIO,
     columns::{Colors, narrow_note},
     head::{Decoded, Head},
-    shape::Shape,
+    shape::{Shape, read_shaped},
 };
 
 use autosplats_cloud::{Contents, Error, Unit, degree_origin, sampled_middle};
@@ -127,7 +127,8 @@ fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
     }
     notes.extend(meaning.notes);
     notes.iter().for_each(|note| job.note(note));
-    Ok(Decoded { cloud: cloud.with_crs(meaning.crs).with_resolution(header.scale.abs()), levels })
+    let lost = lost + damaged.iter().map(|range| range.len() as u64).sum::<u64>();
+    Ok(Decoded { cloud: cloud.with_crs(meaning.crs).with_resolution(header.scale.abs()), levels, lost })
 }
 
 /// The number of complete records, and the number of missing ones.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use autosplats_cloud::{Error, Progress, Wanted};
+use autosplats_cloud::{Error, Wanted};
 use glam::DVec3;
 use laz::DecompressionSelection;
 
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     las::{self, Place},
-    read::{ReadOptions, units},
+    read::ReadOptions,
 };
 
 /// What is taken of the points, and how, where other parts of the same scan tell. The default takes everything.
@@ -69,4 +69,10 @@ fn layer(place: Place) -> u32 {
         36 => DecompressionSelection::NIR,
         _ => DecompressionSelection::ALL,
     }
+}
+
+/// Reads a whole LAS or LAZ file that is a part of a scan, in the units that the file has.
+pub(crate) fn read_shaped(name: &Path, bytes: &[u8], exact: bool, shape: &Shape<'_>) -> Result<Decoded, Error> {
+    let options = ReadOptions { exact, keep_no_returns: true, ..ReadOptions::default() };
+    points(&Job { path: name, progress: &(), bytes, options: &options, triangles: false }, shape)
 }

@@ -3,16 +3,16 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use autosplats_cloud::{Axes, Error, Key, Node, Progress, Ranges, TreeInfo, shown_number};
+use autosplats_cloud::{Axes, Error, Key, Progress, Ranges, TreeInfo, shown_number};
 use glam::DVec3;
 
-use super::{Copc, FIRST, Limits, check_page, hierarchy::MAX_PAGES};
+use super::{Copc, Limits, check_page, hierarchy::MAX_PAGES, take_page};
 use crate::{
     las,
     read::{Description, las::Head},
     tree::{
         directory::{Directory, Entry},
-        watch::Watch,
+        octree::Octree,
     },
 };
 
@@ -121,21 +121,10 @@ pub(crate) fn open(ranges: Arc<dyn Ranges>, progress: &dyn Progress) -> Result<O
         return Err(fail(INFO.start, format!("info record: {what}; build the file again")));
     }
     let limits = Limits { data: points..size, record_len: head.record_len() as u64 };
-    let root = Entry::Page { offset: info.root.start, bytes: page.len() as u32 };
-    let tree = Copc {
-        info: tree_info(&head, &info, notes),
-        cube: info.cube(),
-        ranges,
-        head,
-        limits,
-        directory: Directory::new(root),
-        first: Vec::new(),
-        watch: Watch::default(),
-    };
-    tree.page_read(Key::ROOT, info.root.start, &page)?;
-    let with_points = |key: &Key| matches!(tree.directory.node(*key), Node::Known { points: 1.., .. });
-    let first = std::iter::once(Key::ROOT).chain(Key::ROOT.children()).filter(with_points).take(FIRST).collect();
-    Ok(Some(Copc { first, ..tree }))
+    let directory = Directory::new(Entry::Page { offset: info.root.start, bytes: page.len() as u32 });
+    take_page(&directory, Key::ROOT, info.root.start, &page, &limits, &*ranges)?;
+    let octree = Octree::new(tree_info(&head, &info, notes), directory, head.height_scale);
+    Ok(Some(Copc { ranges, head, limits, octree }))
 }
 
 fn tree_info(head: &Head, info: &Info, mut notes: Vec<String>) -> TreeInfo {
