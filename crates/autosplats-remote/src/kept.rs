@@ -39,7 +39,7 @@ impl Weighter<(u64, Part), Arc<[u8]>> for Weight {
 impl Kept {
     /// A cache of at most `most` bytes.
     pub(crate) fn new(most: u64) -> Self {
-        // One shard, so that an entry may take all of the room.
+        // One shard, so that large entries fit.
         let options = OptionsBuilder::new()
             .shards(1)
             .estimated_items_capacity(USUAL_ENTRIES)
@@ -59,8 +59,11 @@ impl Kept {
         self.bytes.get(&(owner, part)).map(|bytes| bytes.to_vec())
     }
 
+    /// Keeps a copy of bytes, unless they would push out most of the others.
     pub(crate) fn insert(&self, owner: u64, part: Part, bytes: &[u8]) {
-        self.bytes.insert((owner, part), bytes.into());
+        if bytes.len() as u64 <= self.bytes.capacity() / 4 {
+            self.bytes.insert((owner, part), bytes.into());
+        }
     }
 }
 
@@ -81,7 +84,9 @@ mod tests {
         let there: Vec<u64> = (0..1000).filter(bytes).collect();
         assert!((5..=9).contains(&there.len()), "{there:?}");
         assert!(there.iter().all(|at| kept.get(other, part(*at)).is_none()), "those of another file");
-        kept.insert(owner, Part::Named("a".into()), &[0; 200_000]);
-        assert_eq!(kept.get(owner, Part::Named("a".into())), None, "larger than all of the room");
+        for (len, fits) in [(25_001, false), (24_000, true)] {
+            kept.insert(owner, Part::Named("a".into()), &vec![0; len]);
+            assert_eq!(kept.get(owner, Part::Named("a".into())).is_some(), fits, "{len} bytes");
+        }
     }
 }

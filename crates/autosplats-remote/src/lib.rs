@@ -13,8 +13,9 @@
 //! # How it works
 //!
 //! [`Client::open`] asks for the first 64 KB at once. The answer tells the size and the version of the file, and its
-//! bytes are kept, since files begin with what opening needs. Later ranges that are close to each other become one request
-//! (`plan.rs`), and a dozen requests run on threads of their own (`batch.rs`). What arrives stays in a bounded cache.
+//! bytes are kept, since files begin with what opening needs. Later ranges that are close to each other become one
+//! request (`plan.rs`), and a dozen requests run on threads of their own (`batch.rs`). What arrives stays in a bounded
+//! cache.
 //!
 //! A fault (`fault.rs`) is either final, or passing and tried again after a wait (`patience.rs`). A request that breaks
 //! off goes on where it ended. Each answer must be of the version that was opened. Redirects are followed here and not

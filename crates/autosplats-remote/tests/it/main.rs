@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
+mod copc;
 mod encrypted;
 mod faults;
 mod folder;

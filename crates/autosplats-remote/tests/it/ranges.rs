@@ -195,7 +195,7 @@ fn addresses_are_told_from_files() {
 fn files_of_a_client_share_connections_and_memory() {
     let site = Site::new();
     site.add("other", &[9; 200_000]);
-    let client = Client::new(RemoteOptions { cache: 250_000, ..quick() });
+    let client = Client::new(RemoteOptions { cache: 450_000, ..quick() });
     let [file, other] = ["scan.laz", "other"].map(|path| client.open(&site.server.address(path), &()).unwrap());
     let range = 100_000..200_000;
     assert_eq!(part(&*file, range.clone()).unwrap(), bytes(range.clone()));
