@@ -18,9 +18,18 @@ pub(crate) fn is_address(name: &str) -> bool {
     start.is_some_and(|start| SCHEMES.contains(&&*start))
 }
 
-/// The path in an address, without what follows a question mark.
+/// An address without what follows a question mark.
 fn path(address: &str) -> &str {
     address.split(['?', '#']).next().unwrap_or(address)
+}
+
+/// An address for messages: without user, password and query.
+fn shown(address: &str) -> String {
+    let path = path(address);
+    let Some((scheme, rest)) = path.split_once("://") else { return path.into() };
+    let host = rest.find('/').unwrap_or(rest.len());
+    let start = rest[..host].rfind('@').map_or(0, |at| at + 1);
+    format!("{scheme}://{}", &rest[start..])
 }
 
 /// The last part of the path in an address.
@@ -60,11 +69,25 @@ pub fn read_tree(
 
 #[cfg(feature = "http")]
 mod open {
+    use std::sync::{Mutex, PoisonError};
+
     use autosplats_cloud::{Ranges, check_memory};
     use autosplats_formats::{open_ept_in, open_tree_in, read_bytes};
     use autosplats_remote::{Client, Header, RemoteOptions};
 
     use super::*;
+
+    /// The client for these headers. All addresses share its connections and its memory.
+    fn client(texts: &[String], headers: Vec<Header>) -> Client {
+        static KNOWN: Mutex<Vec<(Vec<String>, Client)>> = Mutex::new(Vec::new());
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, client)) = known.iter().find(|(known, _)| known == texts) {
+            return client.clone();
+        }
+        let client = Client::new(RemoteOptions { headers, ..RemoteOptions::from_environment() });
+        known.push((texts.to_vec(), client.clone()));
+        client
+    }
 
     /// What is behind an address.
     enum Found {
@@ -74,11 +97,11 @@ mod open {
 
     fn find(address: &str, options: &ReadOptions, progress: &dyn Progress) -> Result<Found, Error> {
         let header = |text: &String| {
-            let refused = |what| Error::Remote { address: path(address).into(), what };
+            let refused = |what| Error::Remote { address: shown(address), what };
             text.parse::<Header>().map_err(refused)
         };
-        let headers = options.headers.iter().map(header).collect::<Result<_, _>>()?;
-        let client = Client::new(RemoteOptions { headers, ..RemoteOptions::from_environment() });
+        let headers: Vec<Header> = options.headers.iter().map(header).collect::<Result<_, _>>()?;
+        let client = client(&options.headers, headers);
         if path(address).rsplit('/').next() == Some(EPT) {
             return Ok(Found::Tree(open_ept_in(client.open_folder(address)?, progress)?));
         }
@@ -106,7 +129,7 @@ mod open {
             Found::Other(ranges) => {
                 check_memory("a remote file", ranges.size())?;
                 let bytes = ranges.read(&[0..ranges.size(), 0..0], progress)?.swap_remove(0);
-                read_bytes(Path::new(path(address)), &bytes, options, progress)
+                read_bytes(Path::new(&shown(address)), &bytes, options, progress)
             }
         }
     }
@@ -118,7 +141,7 @@ mod open {
 
     fn refused<T>(address: &str) -> Result<T, Error> {
         let what = "this program was built without network access; build it with the feature 'http'".into();
-        Err(Error::Remote { address: path(address).into(), what })
+        Err(Error::Remote { address: shown(address), what })
     }
 
     pub(crate) fn open_tree(address: &str, _: &ReadOptions, _: &dyn Progress) -> Result<Option<Arc<dyn Tree>>, Error> {
@@ -146,5 +169,6 @@ mod tests {
         }
         assert_eq!(short_name("https://a.b/c/d.copc.laz?X-Signature=1/2"), "d.copc.laz");
         assert_eq!(short_name("https://a.b/c/"), "c");
+        assert_eq!(shown("https://me:secret@a.b/c@d?key=1"), "https://a.b/c@d");
     }
 }
