@@ -21,6 +21,9 @@ mod recording;
 mod ros;
 mod seeds;
 mod target;
+#[allow(clippy::unwrap_used, dead_code, reason = "it was written for tests, which use the rest")]
+#[path = "../../crates/autosplats-formats/tests/it/common/trees.rs"]
+mod trees;
 
 use std::{
     collections::HashSet,

@@ -11,6 +11,8 @@ use autosplats_sources::point_cloud2::Encoding;
 use crate::{
     recording::{Message, POINTS as CLOUDS, Style, TRANSFORMS, Topic, bag, mcap},
     ros::{Cloud2, F32, transforms},
+    target::BETWEEN,
+    trees,
 };
 
 /// Files of one format.
@@ -44,6 +46,8 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         seeds("pcd", [written("pcd")?, vec![ascii_pcd(), compressed_pcd()]].concat()),
         seeds("las", [written("las")?, las(false)?].concat()),
         seeds("laz", [written("laz")?, las(true)?].concat()),
+        seeds("copc", vec![trees::copc(&trees::nodes(300)).0]),
+        seeds("ept", epts()?),
         seeds("e57", written("e57")?),
         seeds("ptx", vec![ptx()]),
         seeds("xyz", [written("xyz")?, vec![rows.clone().into_bytes()]].concat()),
@@ -213,6 +217,20 @@ fn las(compressed: bool) -> Result<Vec<Vec<u8>>> {
         Ok(writer.into_inner()?.into_inner())
     };
     (0..=10).filter(|format| !compressed || ![4, 5, 9, 10].contains(format)).map(one).collect()
+}
+
+/// The files of EPTs of one node, one EPT per type of node.
+fn epts() -> Result<Vec<Vec<u8>>> {
+    let mut nodes = trees::nodes(POINTS);
+    nodes.retain(|key, _| key.level == 0);
+    let one = |(kind, extension)| {
+        let folder = tempfile::tempdir()?;
+        trees::write_ept(folder.path(), &nodes, kind);
+        let names = ["ept.json", "ept-hierarchy/0-0-0-0.json", &format!("ept-data/0-0-0-0.{extension}")];
+        let files = names.map(|name| std::fs::read(folder.path().join(name)));
+        Ok(files.into_iter().collect::<std::io::Result<Vec<_>>>()?.join(BETWEEN))
+    };
+    [("laszip", "laz"), ("binary", "bin"), ("zstandard", "zst")].into_iter().map(one).collect()
 }
 
 fn ptx() -> Vec<u8> {

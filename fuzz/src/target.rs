@@ -1,9 +1,11 @@
 //! The readers of an input, chosen by its extension.
 
-use std::{path::Path, time::Duration};
+use std::{path::Path, sync::Arc, time::Duration};
 
-use autosplats_cloud::{Error, Progress};
-use autosplats_formats::{ReadOptions, describe_bytes, read_bytes, read_mesh_bytes};
+use autosplats_cloud::{Error, Folder, MemoryRanges, Progress, Traffic, Tree, Wanted};
+use autosplats_formats::{
+    Part, ReadOptions, describe_bytes, describe_tree, open_ept_in, open_tree_in, read_bytes, read_mesh_bytes, read_part,
+};
 use autosplats_sources::{
     Next, Recording, RecordingOptions, Stream as _,
     point_cloud2::{self, Encoding},
@@ -22,8 +24,64 @@ fn is_recording(name: &Path) -> bool {
     name.extension().is_some_and(|extension| extension == "mcap" || extension == "bag")
 }
 
+/// What separates the files of an EPT in one input.
+pub(crate) const BETWEEN: &[u8] = b"\n----\n";
+
+/// The files of an EPT: its metadata, one for all pages, and one for all nodes.
+#[derive(Debug)]
+struct Files(Vec<Vec<u8>>);
+
+impl Files {
+    fn of(bytes: &[u8]) -> Self {
+        let mut files = Vec::new();
+        let mut rest = bytes;
+        while let Some(at) =
+            rest.windows(BETWEEN.len()).position(|window| window == BETWEEN).filter(|_| files.len() < 2)
+        {
+            files.push(rest[..at].to_vec());
+            rest = &rest[at + BETWEEN.len()..];
+        }
+        files.push(rest.to_vec());
+        files.resize(3, Vec::new());
+        Self(files)
+    }
+}
+
+impl Folder for Files {
+    fn name(&self) -> &Path {
+        Path::new("a")
+    }
+
+    fn read(&self, names: &[String], most: u64, _: &dyn Progress) -> Result<Vec<Vec<u8>>, Error> {
+        let file = |name: &String| {
+            let index = ["ept.json", "ept-hierarchy"].iter().position(|start| name.starts_with(start)).unwrap_or(2);
+            let file = &self.0[index];
+            let fits = file.len() as u64 <= most;
+            if fits { Ok(file.clone()) } else { Err(Error::unsupported(Path::new(name), "it is too large")) }
+        };
+        names.iter().map(file).collect()
+    }
+
+    fn traffic(&self) -> Traffic {
+        Traffic::default()
+    }
+}
+
+/// Opens a file that is a tree.
+fn tree(name: &Path, bytes: &[u8]) -> Result<Option<Arc<dyn Tree>>, Error> {
+    match name.extension().and_then(|extension| extension.to_str()) {
+        Some("copc") => open_tree_in(Arc::new(MemoryRanges::new(name, bytes.to_vec())), &()),
+        Some("ept") => open_ept_in(Arc::new(Files::of(bytes)), &()).map(Some),
+        _ => Ok(None),
+    }
+}
+
 /// Describes a file. Recordings and bare messages have no description.
 pub(crate) fn describe(name: &Path, bytes: &[u8], options: &ReadOptions) -> Result<(), Error> {
+    if let Some(tree) = tree(name, bytes)? {
+        describe_tree(&*tree);
+        return Ok(());
+    }
     if is_recording(name) || message(name).is_some() { Ok(()) } else { describe_bytes(name, bytes, options).map(drop) }
 }
 
@@ -35,6 +93,10 @@ pub(crate) fn read(
     mesh: bool,
     progress: &dyn Progress,
 ) -> Result<usize, Error> {
+    if let Some(tree) = tree(name, bytes)? {
+        let wanted = Wanted { colors: !mesh, exact: options.exact, ..Wanted::default() };
+        return read_part(&*tree, &Part::default(), &wanted, progress).map(|cloud| cloud.len());
+    }
     if let Some(encoding) = message(name) {
         return point_cloud2::decode(name, bytes, encoding, options).map(|message| message.cloud.len());
     }

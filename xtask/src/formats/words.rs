@@ -45,7 +45,7 @@ pub(super) const FORMAT_TEXTS: &[FormatText] = &[
         name: "LAS",
         kept: "LAS 1.0 to 1.4, LAZ and COPC, point formats 0 to 10: coordinates, colours, all attributes, extra bytes, units \
                and coordinate system, scale as resolution; records that a count of zero denies, chunks that no table lists",
-        not_kept: "waveforms; the COPC octree, as all points are read",
+        not_kept: "waveforms; the octree of COPC, unless a part of it is read",
     },
     FormatText {
         name: "PLY",

@@ -1,6 +1,6 @@
 //! The description of a tree by its header and the pages of its hierarchy that are loaded.
 
-use autosplats_cloud::{Tree, shown_number};
+use autosplats_cloud::Tree;
 
 use super::walk::walk;
 use crate::read::{Attribute, Description};
@@ -12,7 +12,6 @@ pub fn describe_tree(tree: &dyn Tree) -> Description {
     let mut details = info.details.clone();
     // Nothing is loaded, so nothing can fail.
     let (nodes, pages) = walk(tree, |_| true, None).unwrap_or_default();
-    details.push(("spacing".into(), format!("{} at the root, half of it at each level below", short(info.spacing))));
     let more = match pages {
         0 => String::new(),
         1 => ", and those of 1 page that is not loaded".into(),
@@ -41,9 +40,4 @@ pub fn describe_tree(tree: &dyn Tree) -> Description {
         notes: info.notes.clone(),
         ..Description::default()
     }
-}
-
-/// A length with five digits.
-fn short(length: f64) -> String {
-    format!("{length:.4e}").parse().map_or_else(|_| length.to_string(), shown_number)
 }

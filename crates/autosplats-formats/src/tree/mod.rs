@@ -15,6 +15,8 @@ mod part;
 mod walk;
 mod watch;
 
+use std::fs::File;
+use std::io::Read as _;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -42,12 +44,11 @@ pub fn open_tree(path: &Path, progress: &dyn Progress) -> Result<Option<Arc<dyn 
         let folder = || Arc::new(LocalFolder::new(path));
         return path.join(EPT).is_file().then(|| open_ept_in(folder(), progress)).transpose();
     }
-    let file = Arc::new(FileRanges::open(path)?);
-    if let Some(name) = ept_name(path, &*file, progress)? {
+    if let Some(name) = ept_name(path)? {
         let folder = Arc::new(LocalFolder::new(path.parent().unwrap_or(Path::new(""))));
         return Ok(Some(Arc::new(ept::open(folder, &name, progress)?)));
     }
-    match open_tree_in(file, progress) {
+    match open_tree_in(Arc::new(FileRanges::open(path)?), progress) {
         Err(Error::Malformed { place, what, .. }) => {
             progress.note(&format!("the file is read whole, since its octree cannot be used: {place}: {what}"));
             Ok(None)
@@ -57,8 +58,10 @@ pub fn open_tree(path: &Path, progress: &dyn Progress) -> Result<Option<Arc<dyn 
 }
 
 /// The name of a file if it has the metadata of an EPT.
-fn ept_name(path: &Path, file: &FileRanges, progress: &dyn Progress) -> Result<Option<String>, Error> {
-    let start = file.read(&[0..file.size().min(SNIFFED)], progress)?.concat();
+fn ept_name(path: &Path) -> Result<Option<String>, Error> {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(SNIFFED).read_to_end(&mut start));
+    read.map_err(|source| Error::Io { path: path.into(), source })?;
     let has = |word: &[u8]| start.windows(word.len()).any(|bytes| bytes == word);
     let object = start.trim_ascii_start().starts_with(b"{");
     let found = object && has(b"\"dataType\"") && has(b"\"schema\"") && has(b"\"span\"");

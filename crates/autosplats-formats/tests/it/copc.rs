@@ -2,10 +2,14 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use autosplats_cloud::{FileRanges, Key, MemoryRanges, Node, PointCloud, PointFilter, Ranges as _, Tree, Wanted};
-use autosplats_formats::{ReadOptions, open_tree, open_tree_in, read_with};
+use autosplats_cloud::{Error, Key, MemoryRanges, Node, PointCloud, PointFilter, Tree, Wanted};
+use autosplats_formats::{ReadOptions, describe_tree, open_tree, open_tree_in, read_bytes, read_with};
 
-use crate::common::{las_files::Notes, shared_data};
+use crate::common::{
+    las_files::{EXACT, Notes},
+    shared_data,
+    trees::{Entry, copc, decoded, everything, keys, nodes, rows, with_page},
+};
 
 /// Number of points, and nodes by level.
 const FILES: [(&str, u64, &[usize]); 2] =
@@ -15,51 +19,13 @@ fn path(name: &str) -> Option<PathBuf> {
     Some(shared_data()?.join("scans").join(name))
 }
 
-fn everything(exact: bool) -> Wanted {
-    Wanted { colors: true, exact, ..Wanted::default() }
-}
-
-/// Keys of all nodes, whose pages are loaded.
-fn keys(tree: &dyn Tree) -> Vec<Key> {
-    let (mut all, mut level) = (Vec::new(), vec![Key::ROOT]);
-    while !level.is_empty() {
-        tree.load_pages(&level, &()).unwrap();
-        level.retain(|&key| tree.node(key) != Node::Absent);
-        all.extend(&level);
-        level = level.iter().flat_map(|key| key.children()).collect();
-    }
-    all
-}
-
-fn decoded(tree: &dyn Tree, key: Key, wanted: &Wanted) -> PointCloud {
-    let bytes = tree.fetch(&[key], &()).unwrap().concat();
-    tree.decode(key, &bytes, wanted).unwrap_or_else(|error| panic!("{error}"))
-}
-
-/// All values of each point, in the order of their coordinates.
-fn rows(clouds: &[PointCloud], fields: &[String]) -> Vec<Vec<i64>> {
-    let mut rows = Vec::new();
-    for cloud in clouds {
-        let fields: Vec<_> = fields.iter().map(|name| cloud.field(name)).collect();
-        for i in 0..cloud.len() {
-            let grid = cloud.world_position(i) / cloud.resolution().unwrap();
-            let mut row: Vec<i64> = grid.to_array().map(|value| value.round() as i64).into();
-            row.extend(cloud.colors().map_or([0; 3], |colors| colors[i]).map(i64::from));
-            row.extend(fields.iter().map(|field| field.map_or(0, |field| field.values.get(i).to_bits() as i64)));
-            rows.push(row);
-        }
-    }
-    rows.sort_unstable();
-    rows
-}
-
 #[test]
 fn nodes_together_are_the_whole_file() {
     for (name, points, levels) in FILES {
         let Some(path) = path(name) else { return };
         let tree = open_tree(&path, &()).unwrap().expect("it is COPC");
         let info = tree.info();
-        assert_eq!((info.points, &info.notes), (points, &Vec::new()), "{name}");
+        assert_eq!(info.points, points, "{name}");
         assert!(tree.traffic().requests <= 3, "{name}: {:?}", tree.traffic());
         let keys = keys(&*tree);
         for (level, count) in levels.iter().enumerate() {
@@ -77,7 +43,7 @@ fn nodes_together_are_the_whole_file() {
             assert_eq!((cloud.crs(), cloud.axes()), (whole.crs(), whole.axes()), "{name} {key}");
             assert!(cloud.byte_len() <= cloud.len() * tree.point_bytes(&everything(true)), "{name} {key}");
         }
-        println!("{name}: {:?}", tree.take_notes());
+        assert_eq!(tree.take_notes(), Vec::<String>::new(), "{name}");
     }
 }
 
@@ -140,6 +106,181 @@ fn other_files_are_no_trees() {
     );
     let told = open_tree_in(Arc::new(MemoryRanges::new("cut", bytes[..2_000_000].to_vec())), &()).unwrap_err();
     assert!(told.to_string().starts_with("cut: byte 469: hierarchy: a page"), "{told}");
-    let file = FileRanges::open(&path).unwrap();
-    assert_eq!(file.size(), bytes.len() as u64);
+}
+
+fn in_memory(bytes: &[u8]) -> Result<Arc<dyn Tree>, Error> {
+    Ok(open_tree_in(Arc::new(MemoryRanges::new("a.copc.laz", bytes.to_vec())), &())?.expect("it is COPC"))
+}
+
+#[test]
+fn a_made_file_is_read_as_others_read_it() {
+    let made = nodes(20_000);
+    let (bytes, entries) = copc(&made);
+    let tree = in_memory(&bytes).unwrap();
+    assert!(tree.info().notes.is_empty() && tree.info().spacing == 4.0, "{:?}", tree.info());
+    assert_eq!(keys(&*tree), made.keys().copied().collect::<Vec<_>>());
+    let whole = read_bytes("a.laz".as_ref(), &bytes, &EXACT, &()).unwrap();
+    let names: Vec<String> = whole.fields().iter().map(|field| field.name.clone()).collect();
+    let all: Vec<_> = made.keys().map(|&key| decoded(&*tree, key, &everything(true))).collect();
+    assert!(rows(&all, &names) == rows(&[whole], &names), "the same points");
+    assert_eq!(tree.take_notes(), Vec::<String>::new());
+    let mut other = las::CopcReader::new(std::io::Cursor::new(bytes)).unwrap();
+    for (cloud, Entry { key: [l, x, y, z], points, .. }) in all.iter().zip(entries) {
+        let entry = other.hierarchy_entry(&las::copc::VoxelKey { l, x, y, z }).unwrap();
+        let theirs = other.read_entry(&entry).unwrap();
+        assert_eq!((theirs.len(), cloud.len()), (points as usize, points as usize));
+        for (i, (x, y)) in theirs.x().zip(theirs.y()).enumerate() {
+            let own = cloud.world_position(i);
+            assert!((own.x - x).abs() < 1e-6 && (own.y - y).abs() < 1e-6, "{own} is not {x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn pages_are_loaded_when_they_are_asked_for() {
+    let (mut bytes, entries) = copc(&nodes(20_000));
+    // The deepest two levels below the first child are on a page, and the deepest of them on another.
+    let below = |entry: &Entry, key: [i32; 4]| {
+        entry.key[0] >= key[0] && (1..4).all(|axis| entry.key[axis] >> (entry.key[0] - key[0]) == key[axis])
+    };
+    let inner = entries.iter().find(|entry| entry.key[0] == 2).unwrap().key;
+    let outer = [1, inner[1] / 2, inner[2] / 2, inner[3] / 2];
+    let page = |key, (offset, len)| Entry { key, offset, bytes: len, points: -1 };
+    let (last, rest): (Vec<_>, Vec<_>) = entries.iter().partition(|entry| below(entry, inner));
+    let last = with_page(&mut bytes, &last);
+    let (mut middle, mut first): (Vec<_>, Vec<_>) = rest.into_iter().partition(|entry| below(entry, outer));
+    middle.push(page(inner, last));
+    first.push(page(outer, with_page(&mut bytes, &middle)));
+    with_page(&mut bytes, &first);
+    let tree = in_memory(&bytes).unwrap();
+    let [inner, outer] =
+        [inner, outer].map(|[level, at @ ..]| Key::new(level.cast_unsigned(), at.map(i32::cast_unsigned)).unwrap());
+    assert_eq!([inner, outer].map(|key| tree.node(key)), [Node::Unknown; 2]);
+    let described = describe_tree(&*tree);
+    let detail = |name: &str| described.details.iter().find(|(own, _)| own == name).map(|(_, value)| value.clone());
+    assert!(detail("nodes").unwrap().ends_with("1 page that is not loaded"), "{described:?}");
+    assert!(detail("level 0").unwrap().ends_with("in 1 node"), "{described:?}");
+    let before = tree.traffic().requests;
+    tree.load_pages(&[inner], &()).unwrap();
+    assert_eq!(tree.traffic().requests, before + 2, "one page tells of the other");
+    assert!(matches!(tree.node(inner), Node::Known { points: 1.., .. }));
+    tree.load_pages(&[inner, outer, Key::ROOT], &()).unwrap();
+    assert_eq!(tree.traffic().requests, before + 2, "known keys cost nothing");
+    assert_eq!(keys(&*tree).len(), entries.len());
+}
+
+#[test]
+fn hostile_hierarchies_are_refused_in_one_line() {
+    let (sound, entries) = copc(&nodes(5000));
+    let (root, child) = (entries[0], entries[1]);
+    let size = sound.len() as u64;
+    let case = |change: &dyn Fn(&mut Vec<Entry>)| {
+        let (mut list, mut bytes) = (entries.clone(), sound.clone());
+        change(&mut list);
+        with_page(&mut bytes, &list);
+        match in_memory(&bytes).and_then(|tree| tree.load_pages(&[Key::ROOT, Key::new(1, [1, 1, 1]).unwrap()], &())) {
+            Ok(()) => "accepted".to_owned(),
+            Err(error) => error.to_string(),
+        }
+    };
+    let page = |key: [i32; 4], offset: u64, bytes: i32| Entry { key, offset, bytes, points: -1 };
+    let cases: &[(&str, &dyn Fn(&mut Vec<Entry>))] = &[
+        ("accepted", &|_| ()),
+        ("accepted", &|list| list[0] = Entry { points: 0, offset: u64::MAX, bytes: -7, ..root }),
+        ("is not made of entries", &|list| list.clear()),
+        ("does not tell of its own node", &|list| _ = list.remove(0)),
+        ("does not tell of its own node", &|list| list[0] = page(root.key, size, 32)),
+        ("twice", &|list| list.push(child)),
+        ("has no parent", &|list| list.push(Entry { key: [9, 1, 2, 3], ..child })),
+        ("no place 1-2-0-0", &|list| list[1].key = [1, 2, 0, 0]),
+        ("no place 31-0-0-0", &|list| list[1].key = [31, 0, 0, 0]),
+        ("no place -1-0-0-0", &|list| list[1].key = [-1, 0, 0, 0]),
+        ("has -2 points", &|list| list[1].points = -2),
+        ("has -5 bytes", &|list| list[1].bytes = -5),
+        ("are not among the points", &|list| list[1].offset = 0),
+        ("are not among the points", &|list| list[1].offset = u64::MAX - 3),
+        ("are not among the points", &|list| list[1].offset = size + (1 << 40)),
+        ("are not among the points", &|list| list[1].bytes = i32::MAX),
+        ("cannot be in 3 bytes", &|list| list[1].bytes = 3),
+        ("cannot be in", &|list| list[1].points = i32::MAX),
+        ("reaches beyond the end", &|list| list.push(page([1, 1, 1, 1], size, i32::MAX))),
+        ("is not made of entries", &|list| list.push(page([1, 1, 1, 1], size, 33))),
+        ("is not made of entries", &|list| list.push(page([1, 1, 1, 1], size, 0))),
+        // The page of the root is no page of a child, so that no page comes again.
+        ("does not tell of its own node", &|list| *list = vec![root, page([1, 1, 1, 1], size, 64)]),
+    ];
+    for (index, (words, change)) in cases.iter().enumerate() {
+        let told = case(*change);
+        assert!(told.contains(words), "case {index}: {told} should contain {words}");
+        assert!(told == "accepted" || told.starts_with("a.copc.laz: byte "), "{told}");
+        assert!(!told.contains(char::is_control) && told.len() < 250, "{told}");
+    }
+    for (at, value, words) in [
+        (429, f64::NAN.to_le_bytes(), "the root's cube is 64 wide about NaN"),
+        (429, 1e300_f64.to_le_bytes(), "where no coordinates can be"),
+        (453, (-1.0_f64).to_le_bytes(), "the root's cube is -2 wide"),
+        (453, 1e300_f64.to_le_bytes(), "where no coordinates can be"),
+        (461, 0_f64.to_le_bytes(), "the spacing is 0"),
+        (469, u64::MAX.to_le_bytes(), "reaches beyond the end"),
+        (477, (1_u64 << 40).to_le_bytes(), "reaches beyond the end"),
+        (235, u64::MAX.to_le_bytes(), "accepted"),
+        (96, [255; 8], "cannot begin at byte 4294967295"),
+    ] {
+        let mut bytes = sound.clone();
+        bytes[at..at + 8].copy_from_slice(&value);
+        let told = in_memory(&bytes).map_or_else(|error| error.to_string(), |_| "accepted".into());
+        assert!(told.contains(words), "byte {at}: {told} should contain {words}");
+    }
+}
+
+#[test]
+fn many_claims_of_a_sparse_file_are_taken_in() {
+    let (mut bytes, entries) = copc(&nodes(5000));
+    let mut list = Vec::new();
+    for level in 0..6 {
+        let side = 1 << level;
+        for at in 0..side * side * side {
+            list.push(Entry { key: [level, at % side, at / side % side, at / side / side], ..entries[0] });
+        }
+    }
+    with_page(&mut bytes, &list);
+    let tree = in_memory(&bytes).unwrap();
+    let described = describe_tree(&*tree);
+    assert!(described.details.iter().any(|(name, value)| name == "level 5" && value.contains("in 32768 nodes")));
+}
+
+#[test]
+fn colours_have_one_scale_everywhere() {
+    // All of the root has 8 bits.
+    let mut made = nodes(20_000);
+    made.values_mut().flatten().for_each(|point| point.color = point.color.map(|channel| channel >> 8));
+    let other = *made.keys().find(|key| key.level == 2).unwrap();
+    made.get_mut(&other).unwrap().iter_mut().for_each(|point| point.color = [40_000; 3]);
+    let tree = in_memory(&copc(&made).0).unwrap();
+    let last = *made.keys().last().unwrap();
+    for key in [last, other, Key::ROOT] {
+        let cloud = decoded(&*tree, key, &everything(false));
+        let expected = made[&key].iter().map(|point| point.color.map(|channel| channel.min(255) as u8));
+        assert!(cloud.colors().unwrap().iter().copied().eq(expected), "node {key}");
+    }
+    let notes = tree.take_notes();
+    assert_eq!(notes.len(), 2, "{notes:?}");
+    assert!(notes[0].contains("read as 8 bits") && notes[1].contains(&format!("of node {other} look like 16 bits")));
+    assert!(tree.take_notes().is_empty(), "told once");
+}
+
+#[test]
+fn what_is_odd_about_nodes_is_told() {
+    let (mut bytes, _) = copc(&nodes(20_000));
+    bytes[461..469].copy_from_slice(&16.0_f64.to_le_bytes());
+    bytes[429..437].copy_from_slice(&(5e5 + 64.0_f64).to_le_bytes());
+    let tree = in_memory(&bytes).unwrap();
+    assert!(
+        tree.info().notes.iter().any(|note| note.contains("not inside the root's cube")),
+        "{:?}",
+        tree.info().notes
+    );
+    decoded(&*tree, Key::ROOT, &everything(false));
+    let notes = tree.take_notes().concat();
+    assert!(notes.contains("spacing of 16 is more than twice") && notes.contains("outside its cube"), "{notes}");
 }

@@ -60,7 +60,7 @@ impl Head {
         let (mut dimensions, notes) = dimensions(&header, &records);
         let meaning = coordinates::of(&header, &records);
         let mut description = describe::of_records(&header, &records, &dimensions, &meaning);
-        description.notes.extend(records.notes.into_iter().chain(notes));
+        description.notes.extend(records.notes.into_iter().chain(notes).chain(meaning.notes));
         description.points = Some(header.stated);
         let height_scale = meaning.crs.height_scale().unwrap_or(1.0);
         units::settle_description(&mut description);

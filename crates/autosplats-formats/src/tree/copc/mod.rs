@@ -122,7 +122,11 @@ impl Tree for Copc {
 
     fn fetch(&self, keys: &[Key], progress: &dyn Progress) -> Result<Vec<Vec<u8>>, Error> {
         let ranges = keys.iter().map(|&key| Ok(self.place(key)?.1)).collect::<Result<Vec<_>, Error>>()?;
-        self.ranges.read(&ranges, progress)
+        let filled: Vec<Range<u64>> = ranges.iter().filter(|range| !range.is_empty()).cloned().collect();
+        let mut read = self.ranges.read(&filled, progress)?.into_iter();
+        // Nodes without points have no bytes.
+        let bytes = |range: &Range<u64>| if range.is_empty() { None } else { read.next() };
+        Ok(ranges.iter().map(bytes).map(Option::unwrap_or_default).collect())
     }
 
     fn decode(&self, key: Key, bytes: &[u8], wanted: &Wanted) -> Result<PointCloud, Error> {

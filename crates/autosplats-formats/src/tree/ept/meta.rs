@@ -224,7 +224,7 @@ impl Meta {
             axes: Some(Axes::ZUp),
             crs: description.crs,
             resolution: description.resolution,
-            details: vec![("span".into(), shown_number(raw.span))],
+            details: vec![("spacing".into(), format!("{} at the root", shown_number(size.x / raw.span)))],
             notes: description.notes,
         };
         (info, crs, height_scale)

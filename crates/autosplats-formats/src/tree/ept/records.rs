@@ -11,7 +11,7 @@ use super::meta::{Column, Encoding, Meta};
 use crate::{
     color_scale::Levels,
     read::{
-        las::{Colors, Decoded, Shape},
+        las::{Colors, Decoded, MAX_RATIO, Shape},
         table::Scalar,
     },
 };
@@ -37,6 +37,9 @@ macro_rules! each_scalar {
 /// The records of a node with so many points.
 pub(super) fn unpacked<'a>(meta: &Meta, bytes: &'a [u8], points: u32) -> Result<Cow<'a, [u8]>, String> {
     let expected = u64::from(points) * meta.stride as u64;
+    if u64::from(points) > MAX_RATIO as u64 * bytes.len() as u64 {
+        return Err(format!("{points} points cannot be in {} bytes; copy the file again", bytes.len()));
+    }
     let records = match meta.encoding {
         Encoding::Zstandard => {
             let frame = StreamingDecoder::new_with_max_window_size(bytes, expected.max(1 << 20));

@@ -11,6 +11,7 @@ use std::{
 #[path = "../../../../autosplats-cloud/tests/it/common/mod.rs"]
 mod clouds;
 pub(crate) mod las_files;
+pub(crate) mod trees;
 
 use autosplats_cloud::{Error, PointCloud, Random};
 use autosplats_formats::read;
