@@ -13,7 +13,7 @@ use syn::visit::{self, Visit};
 const STAGES: [&str; 8] = ["project", "search", "fit", "normals", "adapt", "splat", "shade", "renderer"];
 
 /// Members of the workspace that are not below `crates`.
-const OTHER_CRATES: [&str; 3] = ["quality", "fuzz", "xtask"];
+const OTHER_CRATES: [&str; 4] = ["quality", "fuzz", "serve", "xtask"];
 
 /// Which room uses which, with one file as the witness of each arrow.
 type Arrows = BTreeMap<(String, String), PathBuf>;

@@ -100,7 +100,8 @@ fn cheap(root: &Path, steps: &mut Steps) -> Result<()> {
 }
 
 /// Crates that must stay usable without a graphics stack.
-const POINTS: [&str; 4] = ["autosplats-cloud", "autosplats-formats", "autosplats-scenes", "autosplats-sources"];
+const POINTS: [&str; 5] =
+    ["autosplats-cloud", "autosplats-formats", "autosplats-remote", "autosplats-scenes", "autosplats-sources"];
 
 fn check_dependencies(root: &Path, name: &str) -> Result<()> {
     let mut command = cargo_command(root);

@@ -11,14 +11,18 @@ use crate::progress::Bar;
 
 /// Reads the inputs and writes the file.
 pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
-    let ConvertArgs { paths, input, force, thinning, run: _ } = args;
+    let ConvertArgs { paths, input, force, part, thinning, run: _ } = args;
     let (inputs, output) = Inputs::with_output(paths, input)?;
     check_cloud_target(&output, *force, &inputs.files([]), console)?;
-    let mut cloud = match input.playing.sample {
-        Some(count) => inputs.sample(count, thinning.seed, console)?,
-        None => inputs.read(console)?,
+    let (mut cloud, read) = match input.playing.sample {
+        Some(count) => {
+            let mut cloud = inputs.sample(count, thinning.seed, console)?;
+            let sampled = cloud.len() as u64;
+            part.bounds.iter().for_each(|&[min, max]| cloud.crop(min, max));
+            (cloud, sampled)
+        }
+        None => inputs.read_part(part, console)?,
     };
-    let read = cloud.len();
     if cloud.crs().unit == Some(Unit::Degree) && (thinning.voxel.is_some() || thinning.noise.is_some()) {
         console.note("the coordinates are in degrees, so --voxel and --noise are too");
     }
@@ -27,15 +31,12 @@ pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> 
         return Err(Failure::new(Exit::Input, format!("none of the {read} points lies inside; widen --bounds")));
     }
     let bytes = write_cloud(&cloud, &output, console)?;
-    let of = if cloud.len() < read { format!(" of {read}") } else { String::new() };
+    let of = if (cloud.len() as u64) < read { format!(" of {read}") } else { String::new() };
     console.tell(format_args!("{}: {}{of} points, {bytes} bytes", output.display(), cloud.len()));
     Ok(())
 }
 
 fn thin(cloud: &mut PointCloud, thinning: &ThinningArgs, console: &Console) -> Result<(), Failure> {
-    if let Some([min, max]) = thinning.bounds {
-        cloud.crop(min, max);
-    }
     if let Some(step) = thinning.every {
         cloud.keep_every(step);
     }

@@ -5,17 +5,19 @@ mod pose;
 use std::fs::metadata;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use autosplats::PlacedTree;
 use autosplats_cloud::glam::{DMat4, DVec3};
 use autosplats_cloud::{Error, PointCloud, PointFilter, Progress, check_memory, sample_surface};
-use autosplats_formats::{ReadOptions, read_mesh};
+use autosplats_formats::{Part, ReadOptions, read_mesh};
 use autosplats_scenes::{SCENE_PREFIX, Scene};
-use autosplats_sources::{Input, LatestOptions, Live, PlayOptions, Player, Source, beginnings};
+use autosplats_sources::{Input, LatestOptions, Live, PlayOptions, Player, Source, beginnings, read_tree};
 use rayon::prelude::*;
 
 use self::pose::read_pose;
-use crate::args::{InputArgs, PlayingArgs, ReadingArgs};
+use crate::args::{InputArgs, PartArgs, PlayingArgs, ReadingArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::output::{ReadFiles, folder_of};
@@ -25,6 +27,9 @@ use crate::progress::{Bar, InputProgress};
 const MAX_LISTED_NAMES: usize = 10;
 /// Gap between two inputs, in sizes of the larger one, above which a picture of both shows each as a few pixels.
 const MAX_GAP_SIZES: f64 = 200.0;
+
+/// Files of fewer points are read whole, since that takes no longer than choosing.
+const MIN_TREE_POINTS: u64 = 20_000_000;
 
 /// The inputs of one command. All files exist.
 #[derive(Debug)]
@@ -53,10 +58,11 @@ impl PlayingArgs {
 impl ReadingArgs {
     /// The options for the library.
     pub(crate) fn options(&self) -> ReadOptions {
-        let Self { columns, depth_camera, keep, keep_no_returns } = self;
+        let Self { columns, depth_camera, keep, headers, keep_no_returns } = self;
         ReadOptions {
             columns: columns.clone(),
             keep: keep.clone(),
+            headers: headers.clone(),
             depth_camera: *depth_camera,
             keep_no_returns: *keep_no_returns,
             ..ReadOptions::default()
@@ -175,13 +181,73 @@ impl Inputs {
 
     /// Reads all inputs into one cloud.
     pub(crate) fn read(&self, console: &Console) -> Result<PointCloud, Failure> {
-        self.read_each(console, |input, progress| {
-            if input.source.moves() || is_made(input) {
-                first_frame(input, progress)
+        self.read_each(console, false, read_whole)
+    }
+
+    /// Reads a part of all inputs into one cloud, which may be empty. Returns the number of points of which it is a
+    /// part, too.
+    pub(crate) fn read_part(&self, part: &PartArgs, console: &Console) -> Result<(PointCloud, u64), Failure> {
+        let &PartArgs { bounds, spacing } = part;
+        let all = AtomicU64::new(0);
+        let cloud = self.read_each(console, bounds.is_some(), |input, progress| {
+            let is_partial = bounds.is_some() || spacing.is_some();
+            // The box is in the world: where a pose turns the input, no box of the input's is the same.
+            let is_placed = input.world_from_input != DMat4::IDENTITY;
+            let tree = if is_partial && !is_placed && !is_made(input) {
+                input.source.open_tree(&input.options, progress)?
             } else {
-                input.source.read(&input.options, progress)
+                None
+            };
+            if let Some(tree) = tree {
+                all.fetch_add(tree.info().points, Ordering::Relaxed);
+                return read_tree(&*tree, &Part { bounds, spacing, ..Part::default() }, &input.options, progress);
             }
-        })
+            if spacing.is_some() {
+                let what = if is_placed { "has a pose" } else { "is no octree (COPC, EPT)" };
+                let what = format!("--spacing: it {what}, so all of it is read; leave --spacing out, or use --voxel");
+                return Err(Error::unsupported(Path::new(&input.name), what));
+            }
+            let mut cloud = read_whole(input, progress)?;
+            all.fetch_add(cloud.len() as u64, Ordering::Relaxed);
+            if let Some([min, max]) = bounds.filter(|_| !is_placed) {
+                cloud.crop(min, max);
+            }
+            Ok(cloud)
+        })?;
+        let mut cloud = cloud;
+        bounds.iter().for_each(|&[min, max]| cloud.crop(min, max));
+        Ok((cloud, all.into_inner()))
+    }
+
+    /// Opens the inputs as octrees, with their poses. `None` if they are to be read whole: one of them is no octree, or
+    /// all are files with few points and `always` is not set.
+    pub(crate) fn trees(&self, always: bool, console: &Console) -> Result<Option<Vec<PlacedTree>>, Failure> {
+        let open = |input: &Input| {
+            let bar = Bar::on_file("opening", Path::new(&input.name), console);
+            if is_made(input) {
+                return Ok(None);
+            }
+            let tree = input.source.open_tree(&input.options, &bar).map_err(|error| failure(input, error))?;
+            Ok(tree.map(|tree| PlacedTree { tree, world_from_tree: input.world_from_input }))
+        };
+        let trees: Vec<Option<PlacedTree>> = self.list.iter().map(open).collect::<Result<_, Failure>>()?;
+        let Some(trees) = trees.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
+        let points: u64 = trees.iter().map(|placed| placed.tree.info().points).sum();
+        let is_near = self.list.iter().all(|input| input.source.path().is_some());
+        if is_near && points < MIN_TREE_POINTS && !always {
+            return Ok(None);
+        }
+        Ok(Some(trees))
+    }
+
+    /// Name of the first input whose points move.
+    pub(crate) fn moving(&self) -> Option<&str> {
+        self.list.iter().find(|input| input.moves()).map(|input| &*input.name)
+    }
+
+    /// What the trees of these inputs shall give.
+    pub(crate) fn kept(&self) -> Option<PointFilter> {
+        self.list[0].options.keep.clone()
     }
 
     /// Prepares the inputs for playing, with their poses. If `watched`, files and folders are followed as they change.
@@ -250,16 +316,18 @@ impl Inputs {
             let name = &input.name;
             return Err(Failure::usage(format!("--sample: {name} is not a mesh; set its point count as {name}:1M")));
         }
-        self.read_each(console, |input, progress| match &input.source {
+        self.read_each(console, false, |input, progress| match &input.source {
             Source::File(path) => sample_surface(&read_mesh(path, &input.options, progress)?, count, seed, &()),
             _ => first_frame(input, progress),
         })
     }
 
-    /// Reads the inputs in parallel, each by `read`, and merges them.
+    /// Reads the inputs in parallel, each by `read`, and merges them. Fails for one without points unless some
+    /// `may_be_empty`.
     fn read_each(
         &self,
         console: &Console,
+        may_be_empty: bool,
         read: impl Fn(&Input, &dyn Progress) -> Result<PointCloud, Error> + Sync,
     ) -> Result<PointCloud, Failure> {
         let title = match self.list.as_slice() {
@@ -270,7 +338,7 @@ impl Inputs {
         let parts: Vec<_> = self.list.iter().map(|input| bar.part(self.list.len(), &input.name)).collect();
         let several = self.list.len() > 1;
         let clouds = self.list.par_iter().zip(&parts).map(|(input, part)| match read(input, part) {
-            Ok(cloud) if cloud.is_empty() => {
+            Ok(cloud) if cloud.is_empty() && !may_be_empty => {
                 Err(Failure::new(Exit::Input, format!("{}: there are no points in it", input.name)))
             }
             Ok(cloud) => Ok(Some((cloud, input.world_from_input))),
@@ -392,6 +460,15 @@ fn existing(name: &str) -> Result<Input, Failure> {
     Ok(input)
 }
 
+/// Reads all points of an input, or of its first frame.
+fn read_whole(input: &Input, progress: &dyn Progress) -> Result<PointCloud, Error> {
+    if input.source.moves() || is_made(input) {
+        first_frame(input, progress)
+    } else {
+        input.source.read(&input.options, progress)
+    }
+}
+
 /// Whether the points are sampled or scanned, so that there are none without a surface.
 fn is_made(input: &Input) -> bool {
     input.play.sample.is_some() || input.play.scanners.is_some()
@@ -445,6 +522,7 @@ fn task(input: &Input) -> String {
         }
         Source::Scene(..) => format!("generating {}", input.name),
         Source::Sequence(_) | Source::Recording(_) | Source::StandardInput => format!("reading {}", input.name),
+        Source::Address(_) => format!("fetching {}", input.name),
         Source::Remote(_) => format!("waiting for {}", input.name),
     }
 }

@@ -9,7 +9,7 @@ use autosplats_cloud::{FieldValues, PointCloud, Unit, check_memory};
 use crate::args::NormalsArgs;
 use crate::choices::OrientChoice;
 use crate::console::Console;
-use crate::exit::Failure;
+use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{check_cloud_target, write_cloud};
 use crate::progress::Bar;
@@ -19,7 +19,7 @@ const BYTES_PER_POINT: u64 = 40;
 
 /// Reads the inputs, estimates, and writes the file.
 pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> {
-    let NormalsArgs { paths, input, force, k, orient, sensor, run: _ } = args;
+    let NormalsArgs { paths, input, force, k, orient, sensor, part, run: _ } = args;
     let (inputs, output) = Inputs::with_output(paths, input)?;
     if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pts")) {
         return Err(Failure::usage(format!(
@@ -28,7 +28,10 @@ pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> 
         )));
     }
     check_cloud_target(&output, *force, &inputs.files([]), console)?;
-    let cloud = inputs.read(console)?;
+    let (cloud, read) = inputs.read_part(part, console)?;
+    if cloud.is_empty() {
+        return Err(Failure::new(Exit::Input, format!("none of the {read} points lies inside; widen --bounds")));
+    }
     check_memory(&format!("the normals of {} points", cloud.len()), cloud.len() as u64 * BYTES_PER_POINT)?;
     let bar = Bar::new("estimating normals", console);
     // A neighbourhood needs one unit along all axes, so coordinates in degrees are estimated as metres on the ground.

@@ -161,6 +161,23 @@ pub(crate) fn size(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
+/// Parses a distance in pixels, 0 or more.
+pub(crate) fn detail(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|detail| (0.0..=1000.0).contains(detail)).ok_or("must be within 0 to 1000 pixels".into())
+}
+
+/// Parses a number of bytes, such as `500M` or `2G`.
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim().to_ascii_uppercase();
+    let units = [("K", 10), ("M", 20), ("G", 30), ("T", 40), ("", 0)];
+    let bytes = units.into_iter().find_map(|(unit, shift)| {
+        let number = text.trim_end_matches(['I', 'B']).strip_suffix(unit)?.trim().parse::<f64>().ok()?;
+        Some(number * (1u64 << shift) as f64)
+    });
+    let bytes = bytes.filter(|bytes| (1.0..1e18).contains(bytes));
+    bytes.map(|bytes| bytes as u64).ok_or("must be a number of bytes, such as 500M or 2G".into())
+}
+
 /// Parses a vector, such as `1.5,-2,0`.
 pub(crate) fn vector(text: &str) -> Result<DVec3, String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
@@ -292,6 +309,17 @@ mod tests {
         assert_eq!(duration("0.5"), Ok(Duration::from_millis(500)));
         for bad in ["", "s", "-1s", "nan", "1e300", "2h"] {
             assert!(duration(bad).is_err(), "{bad} is no time");
+        }
+    }
+
+    #[test]
+    fn numbers_of_bytes() {
+        for (text, number) in [("500M", 500 << 20), ("2G", 2 << 30), ("1.5 GiB", 3 << 29), ("64kb", 64 << 10), ("7", 7)]
+        {
+            assert_eq!(bytes(text), Ok(number), "{text}");
+        }
+        for bad in ["", "G", "-1M", "nan", "0", "1e30", "2X"] {
+            assert!(bytes(bad).is_err(), "{bad} is no size");
         }
     }
 

@@ -178,6 +178,12 @@ impl PointCloud {
         Ok(self)
     }
 
+    /// Keeps the fields for whose names `keep` is true.
+    pub fn retain_fields(&mut self, keep: impl Fn(&str) -> bool) {
+        self.identity = Identity::default();
+        self.fields.retain(|field| keep(&field.name));
+    }
+
     /// Sets which axis points up.
     #[must_use]
     pub fn with_axes(mut self, axes: Axes) -> Self {

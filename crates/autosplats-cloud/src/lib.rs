@@ -13,6 +13,7 @@
 //! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
+mod append;
 mod axes;
 mod classes;
 mod cloud;
@@ -62,7 +63,7 @@ pub use precision::{
 };
 pub use progress::{Part, Progress};
 pub use random::Random;
-pub use ranges::{FileRanges, Folder, LocalFolder, MemoryRanges, Ranges, Traffic};
+pub use ranges::{FileRanges, Folder, LocalFolder, MemoryRanges, Ranges, Traffic, check_range};
 pub use sample::{SurfaceSamples, sample_surface};
 pub use scale::computing_scale_of;
-pub use tree::{Key, Node, Tree, TreeInfo, Wanted};
+pub use tree::{Key, Node, NodeKey, Tree, TreeInfo, Wanted};

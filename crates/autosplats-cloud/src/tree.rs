@@ -56,6 +56,29 @@ impl Key {
     }
 }
 
+/// Level and place, as formats name nodes: `2-1-3-0`.
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}-{}-{}", self.level, self.x, self.y, self.z)
+    }
+}
+
+/// A node of one of several trees. Keys are ordered by level, so that sorted ones go from coarse to fine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeKey {
+    /// Place of the node in its tree.
+    pub key: Key,
+    /// Index of the tree.
+    pub tree: u32,
+}
+
+impl From<Key> for NodeKey {
+    /// A node of the first tree.
+    fn from(key: Key) -> Self {
+        Self { key, tree: 0 }
+    }
+}
+
 /// What is known of a place in a [`Tree`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Node {
@@ -75,8 +98,8 @@ pub enum Node {
 /// What a tree states about itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TreeInfo {
-    /// Name of the format.
-    pub format: &'static str,
+    /// Format, version and encoding, for people: `COPC 1.0 (LAS 1.4 point format 7)`.
+    pub format: String,
     /// Number of points in all nodes, as stated.
     pub points: u64,
     /// Lowest and highest corner of the root's cube, in world coordinates.
@@ -85,6 +108,8 @@ pub struct TreeInfo {
     pub bounds: [DVec3; 2],
     /// Distance between neighbouring points of the root, in world units. Each level below halves it.
     pub spacing: f64,
+    /// Values of a point, coordinates included: name and storage type, for people, in the file's order.
+    pub attributes: Vec<(String, String)>,
     /// Whether points have colours.
     pub colors: bool,
     /// Names of the scalar fields.
@@ -95,6 +120,8 @@ pub struct TreeInfo {
     pub crs: Crs,
     /// The step of which coordinates are multiples, per axis, if they are stored as integers.
     pub resolution: Option<DVec3>,
+    /// Further facts as name and value, such as the program that wrote the file.
+    pub details: Vec<(String, String)>,
     /// Notes for the user: what is odd about the file.
     pub notes: Vec<String>,
 }
@@ -110,6 +137,23 @@ pub struct Wanted {
     pub exact: bool,
     /// Which points to keep; `None` keeps all.
     pub keep: Option<PointFilter>,
+    /// Origin of the positions in world coordinates; `None` takes the middle of the node's cube. Clouds of one origin
+    /// [join](PointCloud::append) without rounding.
+    pub origin: Option<DVec3>,
+}
+
+impl Wanted {
+    /// Whether the values of a field are to be decoded: it is wanted, or tells which points to keep.
+    #[must_use]
+    pub fn needs(&self, field: &str) -> bool {
+        self.wants(field) || self.keep.as_ref().is_some_and(|filter| filter.needs(field))
+    }
+
+    /// Whether a field is wanted.
+    #[must_use]
+    pub fn wants(&self, field: &str) -> bool {
+        self.fields.as_ref().is_none_or(|names| names.iter().any(|name| name.eq_ignore_ascii_case(field)))
+    }
 }
 
 /// A scan stored as an octree, of which only the nodes that are needed are read.
@@ -138,12 +182,19 @@ pub trait Tree: Send + Sync + fmt::Debug {
     /// Those of reading.
     fn fetch(&self, keys: &[Key], progress: &dyn Progress) -> Result<Vec<Vec<u8>>, Error>;
 
-    /// Decodes the stored bytes of a node. The cloud's origin is the middle of the node's cube, if one origin suits
-    /// `f32` there.
+    /// Decodes the stored bytes of a node. Values that are zero at every point of the node are left out: a missing field
+    /// is 0 there, and missing colours are black. The first node with colours that is decoded settles whether colours
+    /// have 8 or 16 bits, for which the root may be read.
     ///
     /// # Errors
     /// [`Error::Malformed`] if the bytes are damaged.
     fn decode(&self, key: Key, bytes: &[u8], wanted: &Wanted) -> Result<PointCloud, Error>;
+
+    /// Most bytes of memory that a decoded point takes.
+    fn point_bytes(&self, wanted: &Wanted) -> usize;
+
+    /// What decoding has found odd since the last call: notes for the user, each told once.
+    fn take_notes(&self) -> Vec<String>;
 
     /// What has been read so far.
     fn traffic(&self) -> Traffic;

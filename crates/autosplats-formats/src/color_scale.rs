@@ -63,6 +63,11 @@ impl Levels {
         positive / CLIPPED_ONE_IN
     }
 
+    /// Whether any value is above zero.
+    pub(crate) fn any(&self) -> bool {
+        self.positive > 0
+    }
+
     /// Whether the values have 16 bits: more exceed 8 bits than are clipped.
     pub(crate) fn are_wide(&self) -> bool {
         self.above[1] > Self::most_clipped(self.positive)

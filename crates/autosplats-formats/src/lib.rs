@@ -20,6 +20,7 @@ mod color_scale;
 mod las;
 mod pinhole;
 mod read;
+mod tree;
 mod write;
 
 pub use pinhole::{DepthCamera, PinholeCamera};
@@ -28,4 +29,5 @@ pub use read::{
     framing, gltf_animation, is_named_as_points, read, read_bytes, read_gltf_at, read_marked, read_mesh,
     read_mesh_bytes, read_with, table,
 };
+pub use tree::{Part, describe_tree, open_ept_in, open_tree, open_tree_in, read_part};
 pub use write::{check_writable, write, written_formats};

@@ -69,7 +69,7 @@ impl Input {
         match &self.source {
             Source::File(path) | Source::Recording(path) => absolute(path),
             Source::Sequence(name) => absolute(Path::new(name)),
-            Source::Remote(address) => address.clone(),
+            Source::Remote(address) | Source::Address(address) => address.clone(),
             Source::Scene(..) | Source::StandardInput => self.name.clone(),
         }
     }

@@ -10,6 +10,7 @@
 //! # Ok::<(), autosplats_cloud::Error>(())
 //! ```
 
+mod address;
 mod align;
 mod animation;
 mod clock;
@@ -28,6 +29,7 @@ mod stream;
 mod transforms;
 mod wire;
 
+pub use address::read_tree;
 pub use align::beginnings;
 pub use animation::{Animation, Playback};
 pub use input::Input;

@@ -6,13 +6,14 @@ use std::{
     time::Duration,
 };
 
-use autosplats_cloud::{Error, PointCloud, Progress};
-use autosplats_formats::{ReadOptions, colors_beside, read_mesh, read_with};
+use autosplats_cloud::{Error, PointCloud, Progress, Tree};
+use autosplats_formats::{ReadOptions, colors_beside, open_tree, read_mesh};
 use autosplats_scenes::{SCENE_PREFIX, Scene};
 
 #[cfg(feature = "zenoh")]
 use crate::remote;
 use crate::{
+    address,
     animation::Animation,
     latest::LatestOptions,
     listing::candidates,
@@ -58,6 +59,8 @@ pub enum Source {
     StandardInput,
     /// The address of ROS 2 topics over Zenoh. [`Source::play`] needs the feature `zenoh`.
     Remote(String),
+    /// The `http://`, `https://`, `s3://`, `gs://` or `az://` address of a file. Reading needs the feature `http`.
+    Address(String),
 }
 
 /// How [`Source::play`] plays a source. Options that do not apply to the kind of source are ignored, unless stated.
@@ -112,9 +115,11 @@ impl Source {
     ///
     /// - `scene:NAME[:COUNT][@SECONDS]` is a generated scene.
     /// - `zenoh://[HOST[:PORT]]/TOPIC` is a live topic.
+    /// - `http://`, `https://`, `s3://`, `gs://` and `az://` begin the address of a file.
     /// - `-` is standard input.
     /// - A path that [`is_recording`](crate::is_recording) accepts is a recording: `.mcap`, `.bag`, `.db3`, or the
     ///   folder of a ROS 2 bag.
+    /// - A folder with a file `ept.json` is one scan.
     /// - Any other folder, and a pattern with `*` or `?` that is not itself a path, is a sequence.
     /// - Anything else is a file, which need not exist.
     ///
@@ -129,8 +134,12 @@ impl Source {
             Ok(Self::StandardInput)
         } else if name.starts_with(REMOTE_PREFIX) {
             Ok(Self::Remote(name.into()))
+        } else if address::is_address(name) {
+            Ok(Self::Address(name.into()))
         } else if is_recording(path) {
             Ok(Self::Recording(path.into()))
+        } else if address::is_ept(path) {
+            Ok(Self::File(path.into()))
         } else if path.is_dir() || name.contains(['*', '?']) && !path.exists() {
             Ok(Self::Sequence(name.into()))
         } else {
@@ -142,7 +151,7 @@ impl Source {
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::File(path) | Self::Recording(path) => Some(path),
-            Self::Scene(..) | Self::Sequence(_) | Self::StandardInput | Self::Remote(_) => None,
+            Self::Scene(..) | Self::Sequence(_) | Self::StandardInput | Self::Remote(_) | Self::Address(_) => None,
         }
     }
 
@@ -153,7 +162,7 @@ impl Source {
             Self::Recording(path) if path.is_dir() => candidates(&path.to_string_lossy()).unwrap_or_default(),
             Self::Recording(path) => vec![path.clone()],
             Self::Sequence(name) => candidates(name).unwrap_or_default(),
-            Self::Scene(..) | Self::StandardInput | Self::Remote(_) => Vec::new(),
+            Self::Scene(..) | Self::StandardInput | Self::Remote(_) | Self::Address(_) => Vec::new(),
         };
         let colors: Vec<PathBuf> = files.iter().filter_map(|file| colors_beside(file)).collect();
         files.extend(colors);
@@ -165,6 +174,7 @@ impl Source {
         let path = match self {
             Self::File(path) | Self::Recording(path) => path,
             Self::Sequence(name) | Self::Remote(name) => Path::new(name),
+            Self::Address(address) => return Some(address::short_name(address)),
             Self::Scene(..) | Self::StandardInput => return None,
         };
         path.file_name().map(|name| name.to_string_lossy().into_owned())
@@ -196,7 +206,8 @@ impl Source {
     pub fn read(&self, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
         self.check_filter(options)?;
         match self {
-            Self::File(path) => read_with(path, options, progress),
+            Self::File(path) => address::read_file(path, options, progress),
+            Self::Address(address) => address::read(address, options, progress),
             Self::Scene(scene, count) => scene.sample(*count, progress),
             moving => {
                 let cloud = moving
@@ -204,6 +215,19 @@ impl Source {
                     .first(Self::FIRST_POINTS_TIMEOUT, progress)?;
                 Ok(Arc::unwrap_or_clone(cloud))
             }
+        }
+    }
+
+    /// Opens a file or an address whose points are stored as an octree, so that parts can be read. `None` if they are
+    /// not.
+    ///
+    /// # Errors
+    /// Those of [`open_tree`](autosplats_formats::open_tree), and those of the network.
+    pub fn open_tree(&self, options: &ReadOptions, progress: &dyn Progress) -> Result<Option<Arc<dyn Tree>>, Error> {
+        match self {
+            Self::File(path) => open_tree(path, progress),
+            Self::Address(address) => address::open_tree(address, options, progress),
+            _ => Ok(None),
         }
     }
 
@@ -240,6 +264,7 @@ impl Source {
             Self::Sequence(name) if play.watch => return Self::plain(Live::watch(name.as_ref(), options)?, play),
             Self::Sequence(name) => Animation::sequence(name, play.fps.unwrap_or(SEQUENCE_FPS), options, progress)?,
             Self::Scene(scene, count) => Animation::scene(scene, *count, fps)?,
+            Self::Address(address) => Animation::still(address::read(address, options, progress)?.into()),
             Self::File(path) => {
                 let still = || Ok(Animation::still(read_mesh(path, options, progress)?));
                 if is_gltf(path) {

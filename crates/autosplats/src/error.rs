@@ -104,9 +104,21 @@ pub enum Error {
     /// The target texture is unsuitable. The message says why.
     #[error("target texture: {0}")]
     Texture(String),
+    /// A tree cannot be read.
+    #[error(transparent)]
+    Reading(autosplats_cloud::Error),
     /// [`Progress::cancelled`](autosplats_cloud::Progress::cancelled) or a callback asked to stop.
     #[error("cancelled")]
     Cancelled,
+}
+
+impl From<autosplats_cloud::Error> for Error {
+    fn from(error: autosplats_cloud::Error) -> Self {
+        match error {
+            autosplats_cloud::Error::Cancelled => Self::Cancelled,
+            error => Self::Reading(error),
+        }
+    }
 }
 
 impl Error {
@@ -122,6 +134,7 @@ impl Error {
             Self::Layers { .. } | Self::NothingVisible(_) | Self::Normals { .. } => ErrorKind::Data,
             Self::TooManyPoints(_) | Self::DeviceLimit { .. } | Self::DeviceMemory(_) => ErrorKind::Memory,
             Self::Device(_) | Self::DeviceLost(_) | Self::Texture(_) => ErrorKind::Device,
+            Self::Reading(error) => error.kind(),
             Self::Cancelled => ErrorKind::Cancelled,
         }
     }

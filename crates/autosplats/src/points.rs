@@ -19,14 +19,14 @@ pub(crate) const WHOLE_SHIFT: u32 = u32::BITS - 1;
 /// # Examples
 ///
 /// ```
-/// use autosplats::cloud::{Key, PointCloud, PointPool, glam::DVec3};
+/// use autosplats::cloud::{NodeKey, PointCloud, PointPool, glam::DVec3};
 /// use autosplats::{Camera, Projection, Renderer, Settings, ViewDirection, guess_axes};
 ///
 /// let grid = (0..40_000).map(|i| [(i % 200) as f32, (i / 200) as f32, (i % 7) as f32]);
 /// let root = PointCloud::new(DVec3::ZERO, grid.collect());
 /// let mut pool = PointPool::new(&root, 1_000_000)?;
-/// pool.insert(Key::ROOT, &root);
-/// pool.choose(&[Key::ROOT]);
+/// pool.insert(NodeKey::default(), &root);
+/// pool.choose(&[NodeKey::default()]);
 /// let projection = Projection::PerspectiveFovDeg(40.0);
 /// let camera = Camera::fit(pool.sample(), guess_axes(pool.sample()), ViewDirection::Iso, 1.0, projection)?;
 /// let [mut of_pool, mut of_cloud] = [Renderer::new(), Renderer::new()];
@@ -78,11 +78,16 @@ impl<'a> Points<'a> {
     }
 
     /// Number of points to render.
-    pub(crate) fn len(self) -> usize {
+    pub fn len(self) -> usize {
         match self {
             Self::Cloud(cloud) => cloud.len(),
             Self::Pool(pool) => pool.chosen_points(),
         }
+    }
+
+    /// Whether there are no points to render.
+    pub fn is_empty(self) -> bool {
+        self.len() == 0
     }
 
     /// Largest number that an index of a point stays below.

@@ -16,6 +16,8 @@ Examples:
   autosplats convert scan.e57 thin.laz --voxel 0.05
   autosplats convert survey.laz house.ply --bounds 512030,5403600,290,512080,5403640,320
   autosplats convert statue.glb points.ply --sample 1M --noise 0.001
+  autosplats convert https://example.org/survey.copc.laz part.laz --bounds 512030,5403600,290,512080,5403640,320
+  autosplats convert survey.copc.laz overview.laz --spacing 0.5
   autosplats convert scene:herd:10M herd.ply
   autosplats convert bun000.ply bun045.ply all.ply --pose bun045.ply=bun045.txt";
 
@@ -31,18 +33,30 @@ pub(crate) struct ConvertArgs {
     #[arg(long, help_heading = "Running")]
     pub(crate) force: bool,
     #[command(flatten)]
+    pub(crate) part: PartArgs,
+    #[command(flatten)]
     pub(crate) thinning: ThinningArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+/// The part of the inputs that is read.
+#[derive(Args, Clone, Copy, Debug, Default)]
+#[command(next_help_heading = "Part of the input")]
+pub(crate) struct PartArgs {
+    /// Keep the points inside a box of world coordinates, given by its lower and its upper corner. Of octrees (COPC,
+    /// EPT) only what the box needs is read
+    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds, allow_hyphen_values = true)]
+    pub(crate) bounds: Option<[DVec3; 2]>,
+    /// Read octrees (COPC, EPT) only as far as neighbouring points are SIZE apart, in the input's units
+    #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
+    pub(crate) spacing: Option<f64>,
 }
 
 /// Point processing of `convert`, in the order of its steps.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Point processing, in this order")]
 pub(crate) struct ThinningArgs {
-    /// Keep the points inside a box of world coordinates, given by its lower and its upper corner
-    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds, allow_hyphen_values = true)]
-    pub(crate) bounds: Option<[DVec3; 2]>,
     /// Keep the first of every COUNT points
     #[arg(long, value_name = "COUNT", value_parser = values::step, allow_negative_numbers = true)]
     pub(crate) every: Option<usize>,
@@ -92,6 +106,8 @@ pub(crate) struct NormalsArgs {
     /// Position of the sensor that saw all points, in world coordinates, if the file does not state it
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, conflicts_with = "orient", help_heading = "Normals")]
     pub(crate) sensor: Option<DVec3>,
+    #[command(flatten)]
+    pub(crate) part: PartArgs,
     /// Replace an existing file
     #[arg(long, help_heading = "Running")]
     pub(crate) force: bool,

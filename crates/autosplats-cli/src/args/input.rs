@@ -11,7 +11,7 @@ use crate::values;
 pub(super) const INPUT_HELP: &str = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
 generated scene as scene:NAME[:COUNT][@SECONDS], such as scene:herd:2M. SECONDS is the moment of an animated scene, as in \
-scene:figure@1.5. For points that move: a folder, a quoted file pattern, a recording (.mcap .bag), or - for PLY and PCD \
+scene:figure@1.5. Also an address (https://, s3:// …); of COPC and EPT, only the parts that are needed are read. For points that move: a folder, a quoted file pattern, a recording (.mcap .bag), or - for PLY and PCD \
 on standard input. Several inputs are merged.";
 
 /// Pose, reading and playing of inputs.
@@ -78,7 +78,27 @@ pub(crate) struct ReadingArgs {
     /// keeps all, 'usual' all but noise (classes 7 and 18) and withheld points [default: all, but usual for pictures]
     #[arg(long, value_name = "WORDS", allow_hyphen_values = true)]
     pub(crate) keep: Option<PointFilter>,
+    /// Header to send with requests to addresses, such as 'Authorization: Bearer TOKEN', can be repeated
+    #[arg(long = "header", value_name = "NAME: VALUE", allow_hyphen_values = true)]
+    pub(crate) headers: Vec<String>,
     /// Keep points at (0, 0, 0), the sensor itself, which scanners write for missing returns
     #[arg(long)]
     pub(crate) keep_no_returns: bool,
+}
+
+/// Scans that are stored as octrees (COPC, EPT), of any size.
+#[derive(Args, Clone, Copy, Debug, Default)]
+#[command(next_help_heading = "Scans larger than memory")]
+pub(crate) struct TreeArgs {
+    /// Largest distance between neighbouring points on the screen, in pixels of the written picture: octrees (COPC,
+    /// EPT) are read as far as this needs; 0 reads all points [default: 1; 0 for files of less than 20 million points]
+    #[arg(long, value_name = "PX", value_parser = values::detail, allow_negative_numbers = true)]
+    pub(crate) detail: Option<f64>,
+    /// Most points that a picture is made of, such as 5M. If more are needed, the finest are left out everywhere
+    #[arg(long, value_name = "COUNT", value_parser = values::count, default_value = "10M", allow_negative_numbers = true)]
+    pub(crate) points_budget: usize,
+    /// Memory for the points of octrees and the picture, such as 500M or 2G [default: a quarter of what is free, at most
+    /// 2G]
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
+    pub(crate) memory: Option<u64>,
 }

@@ -1,11 +1,12 @@
 //! Arguments of `render`.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 
 use super::input::INPUT_HELP;
-use super::{CameraArgs, InputArgs, LookArgs, RunArgs, SurfaceArgs};
+use super::{CameraArgs, InputArgs, LookArgs, RunArgs, SurfaceArgs, TreeArgs};
 use crate::exit::EXIT_CODES;
 use crate::values::{self, FrameRange};
 
@@ -22,6 +23,9 @@ Examples:
   producer | autosplats render - -o live_%05d.png
   autosplats render scene:figure --scan 4 --color k-radius --range 0.01..0.03 --legend -o scanned_%03d.png
   autosplats render scene:cathedral:10M -o cathedral.png --occlusion 2 --json
+  autosplats render survey.copc.laz -o survey.png --detail 2 --memory 1G
+  autosplats render survey.copc.laz -o walk.mp4 --camera-path a.json,b.json,c.json --duration 20s
+  autosplats render https://example.org/survey.copc.laz -o survey.png
   autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json
 
 Layers of an .exr file, 32-bit floats except the whole-number index:
@@ -59,7 +63,15 @@ pub(crate) struct RenderArgs {
     #[arg(long, help_heading = "Points that move")]
     pub(crate) watch: bool,
     #[command(flatten)]
+    pub(crate) tree: TreeArgs,
+    #[command(flatten)]
     pub(crate) camera: CameraArgs,
+    /// Fly through the views of these files, which --save-camera wrote, and render a film or numbered pictures
+    #[arg(long, value_name = "FILE,FILE,...", value_delimiter = ',', num_args = 1, conflicts_with_all = ["view", "eye", "fov", "ortho", "camera", "save_camera", "watch"], help_heading = "Camera")]
+    pub(crate) camera_path: Vec<PathBuf>,
+    /// Time of the flight of --camera-path [default: 3 s from view to view]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, requires = "camera_path", help_heading = "Camera")]
+    pub(crate) duration: Option<Duration>,
     #[command(flatten)]
     pub(crate) surface: SurfaceArgs,
     #[command(flatten)]

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use autosplats::guess_axes;
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{Error, FieldValues, PointCloud, Progress, Unit, check_memory};
-use autosplats_formats::{Attribute, Description, ReadOptions, describe, read_with};
+use autosplats_formats::{Attribute, Description, ReadOptions, describe, describe_tree};
 use autosplats_sources::{PlayOptions, RecordingSummary, Source, describe_recording};
 use rayon::prelude::*;
 
@@ -67,7 +67,8 @@ impl Examiner {
         let mut report = Report { input: name.into(), ..Report::default() };
         let outcome = Inputs::new(&[name.into()], &InputArgs::default()).and_then(|inputs| {
             match inputs.only() {
-                Source::File(path) => self.file(path, &mut report),
+                Source::File(path) => self.file(inputs.only(), path, &mut report),
+                address @ Source::Address(_) => self.address(name, address, &mut report),
                 scene @ Source::Scene(..) => self.scene(name, scene, &mut report),
                 moving => self.moving(name, moving, &mut report),
             }
@@ -77,10 +78,15 @@ impl Examiner {
         Examination { report, failure: outcome.err() }
     }
 
-    fn file(&self, path: &Path, report: &mut Report) -> Result<(), Error> {
+    fn file(&self, source: &Source, path: &Path, report: &mut Report) -> Result<(), Error> {
         let bytes = path.metadata().map_or(0, |metadata| metadata.len());
-        report.file_bytes = Some(bytes);
-        let header = describe(path, &self.options)?;
+        report.file_bytes = path.is_file().then_some(bytes);
+        let bar = Bar::on_file("opening", path, &self.console);
+        let header = match source.open_tree(&self.options, &bar)? {
+            Some(tree) => describe_tree(&*tree),
+            None => describe(path, &self.options)?,
+        };
+        drop(bar);
         report.describe(&header);
         if !self.scan && header.points.is_some() && header.bounds.is_some() {
             return Ok(());
@@ -88,7 +94,7 @@ impl Examiner {
         let _alone = (bytes >= LARGE_FILE_BYTES).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
         let bar = Bar::on_file("reading", path, &self.console);
         let listener = NoteCollector { bar: &bar, notes: Mutex::default() };
-        let cloud = read_with(path, &self.options, &listener);
+        let cloud = source.read(&self.options, &listener);
         for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
             report.warn(note);
         }
@@ -96,6 +102,25 @@ impl Examiner {
         let bar = Bar::spinner("measuring", &self.console);
         report.scan(&cloud?, &header.attributes);
         drop(bar);
+        Ok(())
+    }
+
+    /// Describes what is behind an address: an octree by its header and hierarchy, all else by its points.
+    fn address(&self, name: &str, source: &Source, report: &mut Report) -> Result<(), Error> {
+        let bar = Bar::new(&format!("fetching {name}"), &self.console);
+        let listener = NoteCollector { bar: &bar, notes: Mutex::default() };
+        let tree = source.open_tree(&self.options, &listener)?;
+        if let Some(tree) = &tree {
+            report.describe(&describe_tree(&**tree));
+        }
+        if self.scan || tree.is_none() {
+            let cloud = source.read(&self.options, &listener)?;
+            report.format.get_or_insert_with(|| "remote file".into());
+            report.scan(&cloud, &[]);
+        }
+        for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            report.warn(note);
+        }
         Ok(())
     }
 

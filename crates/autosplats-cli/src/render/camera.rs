@@ -151,7 +151,7 @@ fn upward(axes: Axes, sight: DVec3) -> DVec3 {
     if sight.cross(up).length() > 1e-6 * sight.length() { up } else { -front }
 }
 
-fn load(path: &Path, console: &Console) -> Result<Camera, Failure> {
+pub(super) fn load(path: &Path, console: &Console) -> Result<Camera, Failure> {
     let shown = path.display();
     let text = read_text(path).map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
     if let Some(pinhole) = PinholeCamera::parse(&text) {

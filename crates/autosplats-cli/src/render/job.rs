@@ -4,15 +4,16 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use autosplats::{
-    BYTES_PER_PIXEL, Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Reconstruction, Renderer,
-    Settings, Shading, still_supersample, usual_exposure,
+    BYTES_PER_PIXEL, Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Points, Reconstruction,
+    Renderer, Settings, Shading, still_supersample, usual_exposure,
 };
 use autosplats_cloud::{PointCloud, check_memory};
 use autosplats_output::PictureFormat;
 
 use super::camera::CameraJob;
 use super::film::FilmJob;
-use crate::args::{LookArgs, RenderArgs, SurfaceArgs};
+use super::path::CameraPath;
+use crate::args::{LookArgs, RenderArgs, SurfaceArgs, TreeArgs};
 use crate::choices::Map;
 use crate::console::Console;
 use crate::exit::{Exit, Failure, suggest};
@@ -24,6 +25,8 @@ use crate::values::{COLOR_MODES, FirstRadius};
 /// A picture to render: everything except the points.
 pub(super) struct Job {
     pub(super) inputs: Inputs,
+    /// How much of octrees is read.
+    pub(super) tree: TreeArgs,
     pub(super) pictures: Vec<Picture>,
     pub(super) save_camera: Option<PathBuf>,
     /// Input files, which must not be overwritten.
@@ -35,6 +38,8 @@ pub(super) struct Job {
     /// Whether the factor is the default.
     pub(super) supersample_is_default: bool,
     pub(super) camera: CameraJob,
+    /// Views to fly through.
+    pub(super) path: Option<CameraPath>,
     pub(super) settings: Settings,
     pub(super) backend: Backend,
     pub(super) first_radius: FirstRadius,
@@ -54,7 +59,10 @@ impl Job {
             frames,
             resume,
             watch,
+            tree,
             camera,
+            camera_path,
+            duration,
             surface,
             look,
             run: _,
@@ -96,7 +104,8 @@ impl Job {
         let save_camera = camera.save_camera.clone();
         let inputs = Inputs::new(&inputs, &input)?.for_pictures();
         let camera = CameraJob::new(&camera, console)?;
-        let read_files = inputs.files(camera.file());
+        let path = CameraPath::new(&camera_path, duration, console)?;
+        let read_files = inputs.files(camera.file().into_iter().chain(camera_path.iter().map(PathBuf::as_path)));
         let targets = pictures.iter().map(|picture| &picture.path).chain(&named).chain(&save_camera);
         let mut seen = HashSet::new();
         for target in targets {
@@ -120,6 +129,7 @@ impl Job {
         }
         let job = Self {
             inputs,
+            tree,
             pictures,
             save_camera,
             read_files,
@@ -127,6 +137,7 @@ impl Job {
             supersample,
             supersample_is_default,
             camera,
+            path,
             settings,
             backend,
             first_radius,
@@ -155,38 +166,41 @@ impl Job {
         Ok(())
     }
 
-    /// Renders a cloud of any number of points, also none.
-    pub(super) fn render<'a>(
+    /// Renders any number of points, also none.
+    pub(super) fn render<'a, 'p>(
         &self,
         renderer: &'a mut Renderer,
-        cloud: &PointCloud,
+        points: impl Into<Points<'p>>,
         camera: &Camera,
     ) -> Result<Frame<'a>, Failure> {
-        let (size, settings) = (self.rendered_size(), self.settings_for(cloud));
-        Ok(renderer.render_while(cloud, camera, size, &settings, &self.console.goes_on())?)
+        let points = points.into();
+        let (size, settings) = (self.rendered_size(), self.settings_for(points));
+        Ok(renderer.render_while(points, camera, size, &settings, &self.console.goes_on())?)
     }
 
     /// Fixes what all pictures share, by the first of them.
-    pub(super) fn settle(
+    pub(super) fn settle<'p>(
         &mut self,
         renderer: &mut Renderer,
-        cloud: &PointCloud,
+        points: impl Into<Points<'p>>,
         camera: &Camera,
     ) -> Result<(), Failure> {
-        let mut settings = self.settings_for(cloud);
-        renderer.settle(&mut settings, cloud, camera, self.rendered_size(), &self.console.goes_on())?;
+        let points = points.into();
+        let mut settings = self.settings_for(points);
+        renderer.settle(&mut settings, points, camera, self.rendered_size(), &self.console.goes_on())?;
         self.settings.shading = settings.shading;
         Ok(())
     }
 
-    /// The settings for a cloud of any number of points, also none. No point has more neighbours than there are others.
-    fn settings_for(&self, cloud: &PointCloud) -> Settings {
+    /// The settings for any number of points, also none. No point has more neighbours than there are others.
+    fn settings_for<'p>(&self, points: impl Into<Points<'p>>) -> Settings {
+        let points = points.into();
         let mut settings = self.settings.clone();
-        if cloud.is_empty() {
+        if points.is_empty() {
             // An empty cloud has no colours; the picture shows the background.
             settings.shading.color = ColorMode::Plain;
         }
-        settings.reconstruction.k = settings.reconstruction.k.min(cloud.len().saturating_sub(1).max(1) as u32);
+        settings.reconstruction.k = settings.reconstruction.k.min(points.len().saturating_sub(1).max(1) as u32);
         settings
     }
 

@@ -2,24 +2,27 @@
 
 mod camera;
 mod film;
+mod flight;
 mod job;
 mod live;
 mod moving;
+mod path;
 mod pictures;
 mod placement;
 mod report;
+mod scan;
 mod schedule;
 
 use std::time::Instant;
 
-use autosplats::{Camera, Counts, Frame, Renderer};
+use autosplats::{Camera, Counts, Frame, Points, Renderer};
 use autosplats_cloud::Axes;
 use autosplats_output::write_exr;
 
 pub(crate) use self::camera::scene_camera;
 use self::film::FilmJob;
 use self::job::Job;
-use self::report::Report;
+use self::report::{Report, TreeReport};
 use crate::args::RenderArgs;
 use crate::console::Console;
 use crate::device::Device;
@@ -34,10 +37,16 @@ pub(crate) fn run(args: RenderArgs, console: &Console) -> Result<(), Failure> {
     let mut renderer = Renderer::with_backend(job.backend)?;
     renderer.check(&job.settings)?;
     let device = Device::of(&renderer);
+    if job.path.is_some() {
+        return flight::run(job, film, &mut renderer, &device);
+    }
     if let Some(film) = film {
         return render_frames(&mut job, &film, &mut renderer, &device);
     }
 
+    if let Some(trees) = scan::trees(&job)? {
+        return scan::run(job, trees, &mut renderer, &device);
+    }
     let started = Instant::now();
     let mut cloud = job.inputs.read(console)?;
     let degrees = cloud.to_local_metres();
@@ -55,16 +64,7 @@ pub(crate) fn run(args: RenderArgs, console: &Console) -> Result<(), Failure> {
         notes.push("coordinates in degrees are shown in metres east, north and up of the points' middle".to_owned());
     }
     notes.extend(job.fewer_neighbors(&cloud));
-    let placed = Placed { camera, axes, read, notes };
-    let bar = Bar::spinner("rendering", console);
-    match job.render(&mut renderer, &cloud, &camera) {
-        // A device may lack the memory for supersampling by default; the picture is then rendered without.
-        Err(failure) if failure.exit == Exit::Memory && job.supersample > 1 && job.supersample_is_default => {}
-        frame => return placed.conclude(&job, &device, bar, frame?),
-    }
-    job.supersample = 1;
-    let frame = job.render(&mut renderer, &cloud, &camera)?;
-    placed.conclude(&job, &device, bar, frame)
+    Placed { camera, axes, read, notes, tree: None }.picture(job, &mut renderer, &device, (&cloud).into())
 }
 
 /// Renders a picture per frame of the inputs.
@@ -88,12 +88,33 @@ struct Placed {
     read: f64,
     /// Notes on the points.
     notes: Vec<String>,
+    /// What was read of octrees.
+    tree: Option<TreeReport>,
 }
 
 impl Placed {
+    /// Renders a picture, writes it and prints the summary.
+    fn picture(
+        self,
+        mut job: Job,
+        renderer: &mut Renderer,
+        device: &Device,
+        points: Points<'_>,
+    ) -> Result<(), Failure> {
+        let bar = Bar::spinner("rendering", &job.console);
+        match job.render(renderer, points, &self.camera) {
+            // A device may lack the memory for supersampling by default; the picture is then rendered without.
+            Err(failure) if failure.exit == Exit::Memory && job.supersample > 1 && job.supersample_is_default => {}
+            frame => return self.conclude(&job, device, bar, frame?),
+        }
+        job.supersample = 1;
+        let frame = job.render(renderer, points, &self.camera)?;
+        self.conclude(&job, device, bar, frame)
+    }
+
     /// Ends the progress bar of rendering, writes the picture and prints the summary.
     fn conclude(self, job: &Job, device: &Device, bar: Bar, frame: Frame<'_>) -> Result<(), Failure> {
-        let Self { camera, axes, read, notes } = self;
+        let Self { camera, axes, read, notes, tree } = self;
         drop(bar);
         check_visible(&frame, job)?;
         notes.iter().for_each(|note| job.console.note(note));
@@ -108,7 +129,7 @@ impl Placed {
         }
         let write = milliseconds_since(started);
 
-        let report = Report::new(job, device, camera, axes, &frame, written, [read, write]);
+        let report = Report::new(job, device, camera, axes, &frame, written, [read, write]).with_tree(tree);
         if job.json {
             job.console.print_json(&report)?;
         }

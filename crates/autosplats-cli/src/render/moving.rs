@@ -93,7 +93,7 @@ pub(super) fn run(
             tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let seconds = scene.times[frame] as f64 / 1e9;
-            let report = FrameReport { frame, seconds, path, pictures, counts, read_ms, timings_ms };
+            let report = FrameReport { frame, seconds, path, pictures, counts, tree: None, read_ms, timings_ms };
             if !writer.put(QueuedPicture { image: writer.picture(job, &rendered), report }) {
                 // The writer has failed and reports why.
                 return Ok(());

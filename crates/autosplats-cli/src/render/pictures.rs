@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::film::FilmJob;
 use super::job::Job;
+use super::report::TreeReport;
 use crate::console::Console;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -52,6 +53,9 @@ pub(super) struct FrameReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) pictures: Option<usize>,
     pub(super) counts: Counts,
+    /// What was read of octrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) tree: Option<TreeReport>,
     /// Reading time in milliseconds, including the wait for live input.
     pub(super) read_ms: f64,
     pub(super) timings_ms: Timings,
@@ -188,6 +192,11 @@ impl FrameTally {
             let (count, first) = self.empty.unwrap_or((0, frame));
             self.empty = Some((count + 1, first));
         }
+    }
+
+    /// Whether no rendered frame shows a surface.
+    pub(super) fn shows_nothing(&self) -> bool {
+        self.empty.is_some_and(|(count, _)| count >= self.written)
     }
 
     /// Tells the summary.

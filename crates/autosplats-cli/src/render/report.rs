@@ -21,9 +21,30 @@ pub(super) struct Report<'a> {
     axes: &'static str,
     camera: Camera,
     outputs: Vec<Written>,
+    /// What was read of octrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tree: Option<TreeReport>,
     timings_ms: PrintedTimings,
     /// Times of the passes of a graphics device.
     passes: Vec<PassTime>,
+}
+
+/// What was read of octrees for a picture.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct TreeReport {
+    /// Number of points that all nodes have.
+    pub(super) stored_points: u64,
+    /// Number of nodes that the picture is made of.
+    pub(super) nodes: usize,
+    /// Number of their points.
+    pub(super) points: u64,
+    /// Bytes read so far, and in how many requests.
+    pub(super) bytes: u64,
+    pub(super) requests: u64,
+    /// Largest distance in pixels between neighbouring points to which finer ones exist.
+    pub(super) spacing_px: f64,
+    /// Milliseconds from the first byte read until all points were there.
+    pub(super) complete_ms: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -60,17 +81,24 @@ impl<'a> Report<'a> {
             axes: axes.name(),
             camera,
             outputs: written.into_iter().map(|(path, bytes)| Written { path, bytes }).collect(),
+            tree: None,
             timings_ms: PrintedTimings { read, stages: frame.timings, write },
             passes: frame.passes.to_vec(),
         }
+    }
+
+    /// Adds what was read of octrees.
+    pub(super) fn with_tree(self, tree: Option<TreeReport>) -> Self {
+        Self { tree, ..self }
     }
 
     /// The summary for people.
     pub(super) fn summary(&self) -> String {
         let names: Vec<_> = self.outputs.iter().map(|written| written.path.display().to_string()).collect();
         let PrintedTimings { read, stages, write } = &self.timings_ms;
+        let of = self.tree.as_ref().map_or_else(String::new, |tree| format!(" of {}", tree.stored_points));
         format!(
-            "{}: {} points, {} visible; read {read:.0} ms, frame {:.0} ms, write {write:.0} ms",
+            "{}: {} points{of}, {} visible; read {read:.0} ms, frame {:.0} ms, write {write:.0} ms",
             names.join(", "),
             self.counts.points,
             self.counts.visible,

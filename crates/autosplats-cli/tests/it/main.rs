@@ -18,4 +18,6 @@ mod real_files;
 mod render;
 mod streams;
 mod texts;
+#[cfg(feature = "http")]
+mod trees;
 mod usage;

@@ -119,6 +119,17 @@ impl PointFilter {
         self.text == words::USUAL
     }
 
+    /// Whether the filter looks at a field of this name.
+    #[must_use]
+    pub fn needs(&self, field: &str) -> bool {
+        let plain = plain_field(field);
+        let names = |column: &Column| match column {
+            Column::Class => CLASS_FIELDS.contains(&&*plain),
+            Column::Named(name) => words::plain(name) == plain,
+        };
+        self.terms.iter().flat_map(|term| &term.tests).any(|test| test.columns().iter().any(names))
+    }
+
     /// Name of a field that the filter needs and the cloud lacks. `None` if it has all of them, or if the filter is
     /// [`usual`](Self::usual), which needs none.
     #[must_use]

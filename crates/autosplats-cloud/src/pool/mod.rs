@@ -20,7 +20,7 @@ use glam::DVec3;
 
 use crate::identity::Identity;
 use crate::merge::GREY;
-use crate::{Error, FieldValues, Key, PointCloud, RelativeValues, ValueOrigin, check_memory};
+use crate::{Axes, Error, FieldValues, NodeKey, PointCloud, RelativeValues, ValueOrigin, check_memory};
 
 /// Points in a slot.
 pub const SLOT_POINTS: usize = 1 << SLOT_SHIFT;
@@ -45,15 +45,15 @@ pub struct PointRun {
 /// # Examples
 ///
 /// ```
-/// use autosplats_cloud::{Key, PointCloud, PointPool, glam::DVec3};
+/// use autosplats_cloud::{Key, NodeKey, PointCloud, PointPool, glam::DVec3};
 ///
 /// let root = PointCloud::new(DVec3::new(5e6, 0.0, 0.0), vec![[0.25, 0.0, 0.0]; 5000]);
 /// let mut pool = PointPool::new(&root, 100_000)?;
-/// assert!(pool.insert(Key::ROOT, &root));
-/// let child = Key::new(1, [0, 0, 0]).expect("a place");
-/// assert_eq!(pool.choose(&[Key::ROOT, child]), [child], "which has to be inserted yet");
-/// let index = pool.index_of(Key::ROOT, 4999).expect("a point");
-/// assert_eq!(pool.place_of(index), Some((Key::ROOT, 4999)));
+/// let node = |level| NodeKey::from(Key { level, ..Key::ROOT });
+/// assert!(pool.insert(node(0), &root));
+/// assert_eq!(pool.choose(&[node(0), node(1)]), [node(1)], "which has to be inserted yet");
+/// let index = pool.index_of(node(0), 4999).expect("a point");
+/// assert_eq!(pool.place_of(index), Some((node(0), 4999)));
 /// assert_eq!(pool.world_position(index), Some(DVec3::new(5_000_000.25, 0.0, 0.0)));
 /// # Ok::<(), autosplats_cloud::Error>(())
 /// ```
@@ -71,9 +71,9 @@ pub struct PointPool {
     slots: Vec<Slot>,
     /// Slots in use before that hold nothing.
     free: BTreeSet<u32>,
-    nodes: BTreeMap<Key, Node>,
+    nodes: BTreeMap<NodeKey, Node>,
     /// Keys of the chosen nodes, ascending.
-    chosen: Vec<Key>,
+    chosen: Vec<NodeKey>,
     /// Number of choices so far.
     choices: u64,
     generation: u64,
@@ -92,7 +92,7 @@ struct Slot {
     /// Generation of the last write.
     written: u64,
     /// Node that holds the slot, and which of its slots this is.
-    owner: Option<(Key, u32)>,
+    owner: Option<(NodeKey, u32)>,
 }
 
 #[derive(Debug)]
@@ -171,6 +171,13 @@ impl PointPool {
         })
     }
 
+    /// Sets which axis points up.
+    #[must_use]
+    pub fn with_axes(mut self, axes: Axes) -> Self {
+        self.sample = self.sample.with_axes(axes);
+        self
+    }
+
     /// Bytes that a point takes in a pool with the columns of `sample`.
     pub fn bytes_per_point(sample: &PointCloud) -> usize {
         let color = sample.colors().map_or(0, |_| size_of::<[u8; 3]>());
@@ -184,7 +191,7 @@ impl PointPool {
     /// Points of a node without colours are grey if the pool has colours, as in
     /// [merged](PointCloud::merge) clouds. A field that the node lacks has no values (NaN) there. Other columns,
     /// residuals and scans are not kept.
-    pub fn insert(&mut self, key: Key, node: &PointCloud) -> bool {
+    pub fn insert(&mut self, key: NodeKey, node: &PointCloud) -> bool {
         if self.nodes.contains_key(&key) {
             return true;
         }
@@ -266,7 +273,7 @@ impl PointPool {
     }
 
     /// Removes a node, also a chosen one. Returns whether it was there.
-    pub fn remove(&mut self, key: Key) -> bool {
+    pub fn remove(&mut self, key: NodeKey) -> bool {
         let Some(node) = self.nodes.remove(&key) else { return false };
         for slot in node.slots {
             self.slots[slot as usize].owner = None;
@@ -278,12 +285,12 @@ impl PointPool {
 
     /// Chooses the nodes that the next frames show, in place of those chosen before. No chosen node leaves to make
     /// room. Returns those of `keys` that are not in the pool, ascending.
-    pub fn choose(&mut self, keys: &[Key]) -> Vec<Key> {
+    pub fn choose(&mut self, keys: &[NodeKey]) -> Vec<NodeKey> {
         self.choices += 1;
         for key in std::mem::take(&mut self.chosen) {
             self.nodes.get_mut(&key).expect("chosen nodes stay").is_chosen = false;
         }
-        let keys: BTreeSet<Key> = keys.iter().copied().collect();
+        let keys: BTreeSet<NodeKey> = keys.iter().copied().collect();
         let (present, missing) = keys.into_iter().partition(|key| self.nodes.contains_key(key));
         self.chosen = present;
         for key in &self.chosen {
@@ -294,7 +301,7 @@ impl PointPool {
     }
 
     /// Whether a node is in the pool.
-    pub fn contains(&self, key: Key) -> bool {
+    pub fn contains(&self, key: NodeKey) -> bool {
         self.nodes.contains_key(&key)
     }
 
@@ -319,13 +326,13 @@ impl PointPool {
     }
 
     /// Index of point `point` of a node; `None` if it is not in the pool. The index is the same while the node stays.
-    pub fn index_of(&self, key: Key, point: usize) -> Option<u32> {
+    pub fn index_of(&self, key: NodeKey, point: usize) -> Option<u32> {
         let node = self.nodes.get(&key).filter(|node| point < node.points)?;
         Some((node.slots[point >> SLOT_SHIFT] << SLOT_SHIFT) + (point % SLOT_POINTS) as u32)
     }
 
     /// Node of the point at an index, and the point's index in the node; `None` if no node has the index.
-    pub fn place_of(&self, index: u32) -> Option<(Key, usize)> {
+    pub fn place_of(&self, index: u32) -> Option<(NodeKey, usize)> {
         let (key, number) = self.slots.get((index >> SLOT_SHIFT) as usize)?.owner?;
         let point = number as usize * SLOT_POINTS + index as usize % SLOT_POINTS;
         (point < self.nodes[&key].points).then_some((key, point))

@@ -6,8 +6,8 @@ use crate::{Axes, Random, Scan};
 const SLOTS: usize = 9;
 
 /// Keys of the third level.
-fn key(number: u32) -> Key {
-    Key::new(3, [number % 8, number / 8 % 8, number / 64 % 8]).expect("a place")
+fn key(number: u32) -> NodeKey {
+    Key::new(3, [number % 8, number / 8 % 8, number / 64 % 8]).expect("a place").into()
 }
 
 /// A node of `len` points that all have a coordinate, a colour and a value of their own.
@@ -25,7 +25,7 @@ fn pool(capacity: usize) -> PointPool {
 }
 
 /// Asserts that the runs of the chosen nodes are exactly their points, in order, with all attributes.
-fn assert_holds(pool: &PointPool, nodes: &BTreeMap<Key, PointCloud>, chosen: &BTreeSet<Key>) {
+fn assert_holds(pool: &PointPool, nodes: &BTreeMap<NodeKey, PointCloud>, chosen: &BTreeSet<NodeKey>) {
     let mut runs = pool.runs().into_iter();
     let times = pool.field("gpstime").expect("a field");
     for (key, node) in nodes.iter().filter(|(key, _)| chosen.contains(key)) {
@@ -46,7 +46,7 @@ fn assert_holds(pool: &PointPool, nodes: &BTreeMap<Key, PointCloud>, chosen: &BT
         }
     }
     assert_eq!(runs.next(), None);
-    let len = |key: &Key| nodes[key].len();
+    let len = |key: &NodeKey| nodes[key].len();
     assert_eq!(pool.chosen_points(), chosen.iter().map(len).sum::<usize>());
 }
 
@@ -55,7 +55,7 @@ fn nodes_come_and_go_and_points_stay() {
     let mut random = Random::from_state(51);
     let mut pool = pool(SLOTS * SLOT_POINTS + 17);
     assert_eq!(pool.capacity(), SLOTS * SLOT_POINTS, "whole slots");
-    let mut nodes: BTreeMap<Key, PointCloud> = BTreeMap::new();
+    let mut nodes: BTreeMap<NodeKey, PointCloud> = BTreeMap::new();
     let mut chosen = BTreeSet::new();
     let mut refused = 0;
     for number in 0..200 {
@@ -66,8 +66,8 @@ fn nodes_come_and_go_and_points_stay() {
                 chosen.remove(&removed);
             }
             1 | 2 => {
-                let wanted: Vec<Key> = (0..6).map(|_| key(random.modulo(12) as u32)).collect();
-                let missing: BTreeSet<Key> = pool.choose(&wanted).into_iter().collect();
+                let wanted: Vec<NodeKey> = (0..6).map(|_| key(random.modulo(12) as u32)).collect();
+                let missing: BTreeSet<NodeKey> = pool.choose(&wanted).into_iter().collect();
                 chosen = wanted.into_iter().collect();
                 assert_eq!(missing, chosen.iter().filter(|key| !nodes.contains_key(key)).copied().collect());
                 chosen.retain(|key| nodes.contains_key(key));
@@ -80,7 +80,7 @@ fn nodes_come_and_go_and_points_stay() {
                     nodes.entry(key).or_insert(made);
                 } else {
                     refused += 1;
-                    let slots = |key: &Key| nodes[key].len().div_ceil(SLOT_POINTS);
+                    let slots = |key: &NodeKey| nodes[key].len().div_ceil(SLOT_POINTS);
                     let pinned: usize = chosen.iter().map(slots).sum();
                     assert!(pinned + len.div_ceil(SLOT_POINTS) > SLOTS, "there was room");
                 }
@@ -100,8 +100,8 @@ fn nodes_come_and_go_and_points_stay() {
 #[test]
 fn what_was_not_chosen_for_the_longest_time_leaves_first_and_the_finest_of_it() {
     let mut pool = pool(4 * SLOT_POINTS);
-    let child = Key::new(1, [0; 3]).expect("a place");
-    for (number, key) in [Key::ROOT, child, key(0), key(1)].into_iter().enumerate() {
+    let child = Key::new(1, [0; 3]).expect("a place").into();
+    for (number, key) in [NodeKey::default(), child, key(0), key(1)].into_iter().enumerate() {
         assert!(pool.insert(key, &node(number as u32, 10)));
     }
     pool.choose(&[key(0)]);
@@ -109,7 +109,7 @@ fn what_was_not_chosen_for_the_longest_time_leaves_first_and_the_finest_of_it() 
     assert!(pool.insert(key(2), &node(2, 10)));
     assert!(!pool.contains(child), "never chosen, and finer than the root");
     assert!(pool.insert(key(3), &node(3, 10)));
-    assert!(!pool.contains(Key::ROOT), "never chosen");
+    assert!(!pool.contains(NodeKey::default()), "never chosen");
     assert!(pool.insert(key(4), &node(4, 10)));
     assert!(!pool.contains(key(0)), "chosen before the others came");
     let all = [key(1), key(2), key(3), key(4)];

@@ -47,7 +47,7 @@ pub struct Traffic {
 ///
 /// # Errors
 /// [`Error::Malformed`].
-pub(crate) fn check_range(name: &Path, range: &Range<u64>, size: u64) -> Result<(), Error> {
+pub fn check_range(name: &Path, range: &Range<u64>, size: u64) -> Result<(), Error> {
     if range.start <= range.end && range.end <= size {
         return Ok(());
     }

@@ -20,7 +20,7 @@ pub mod framing;
 mod gltf;
 mod grid;
 mod job;
-mod las;
+pub(crate) mod las;
 mod lines;
 mod mesh;
 mod names;
@@ -37,7 +37,7 @@ mod sensor;
 mod stl;
 pub mod table;
 mod text;
-mod units;
+pub(crate) mod units;
 mod unpack;
 mod xyz;
 

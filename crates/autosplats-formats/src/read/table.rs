@@ -50,7 +50,7 @@ impl Scalar {
         }
     }
 
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::I8 => "int8",
             Self::U8 => "uint8",

@@ -3,10 +3,12 @@
 //! Longitude and latitude stay in degrees; whoever shows or measures them [converts](PointCloud::to_local_metres) them
 //! to metres on the ground. Heights in another unit of length than x and y are scaled to that unit.
 
+use std::path::Path;
+
 use autosplats_cloud::{Axes, Crs, Error, PointCloud, Unit, looks_like_degrees, sampled_bounds};
 use glam::DVec3;
 
-use super::{Description, Job};
+use super::{Description, Job, ReadOptions};
 
 /// How much higher than wide a box must look to be in degrees, if nothing but its shape tells: a relief of one percent.
 const DEGREES_RATIO: f64 = 1000.0;
@@ -43,8 +45,16 @@ pub(super) fn settle(job: &Job<'_>, cloud: &mut PointCloud) -> Result<(), Error>
     Ok(())
 }
 
+/// A part of a scan with its units [settled](settle), without a note.
+pub(crate) fn settled(name: &Path, mut cloud: PointCloud) -> Result<PointCloud, Error> {
+    let options = ReadOptions::default();
+    let job = Job { path: name, progress: &(), bytes: &[], options: &options, triangles: false };
+    settle(&job, &mut cloud)?;
+    Ok(cloud)
+}
+
 /// Settles the units of a description like those of the points.
-pub(super) fn settle_description(description: &mut Description) {
+pub(crate) fn settle_description(description: &mut Description) {
     if let (Some(note), Some(scale)) = (scaled(&description.crs), description.crs.height_scale()) {
         let scale = DVec3::new(1.0, 1.0, scale);
         description.bounds = description.bounds.map(|bounds| bounds.map(|corner| corner * scale));

@@ -5,6 +5,7 @@
 mod choosing;
 mod color_scales;
 mod common;
+mod copc;
 mod depth_images;
 mod e57;
 mod e57_faults;

@@ -32,7 +32,7 @@ use crate::Error;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
-    pub(super) eye: DVec3,
+    pub(crate) eye: DVec3,
     /// Unit vectors right, down and forward, world coordinates.
     pub(super) axes: [DVec3; 3],
     /// Middle of the picture in pixels.
@@ -42,7 +42,7 @@ pub struct Lens {
     /// Whether all lines of sight meet in the eye.
     pub(super) perspective: bool,
     /// Near plane: points at this depth or nearer are not in the picture.
-    pub(super) near: f64,
+    pub(crate) near: f64,
 }
 
 impl Camera {

@@ -21,6 +21,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
+/// Shorter side of the picture over the width of its margin.
+pub(crate) const PICTURE_SIDE_PER_MARGIN: u32 = 12;
+
 /// A camera in world coordinates.
 ///
 /// # Examples

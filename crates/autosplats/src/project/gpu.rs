@@ -271,7 +271,7 @@ impl NearestPass {
         let turn = |turn: u32| {
             let told = gpu.uniform::<u32>("turn")?;
             gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&turn));
-            Ok(told)
+            Ok::<_, Error>(told)
         };
         Ok(Self::Twice(Pass::new(gpu, &PROJECT_32, &[])?, [turn(0)?, turn(1)?]))
     }

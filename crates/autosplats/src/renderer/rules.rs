@@ -15,15 +15,13 @@
 
 use super::Reconstruction;
 use crate::adapt::AdaptRules;
-use crate::camera::View;
+use crate::camera::{PICTURE_SIDE_PER_MARGIN, View};
 use crate::fit::{FitRules, LONGEST, MIN_SURFACE_POINTS};
 use crate::points::Points;
 use crate::project::ProjectRules;
 use crate::search::{SearchEngine, SearchRules};
 use crate::splat::{STEADY_FRAMES, TrimRules};
 
-/// Shorter side of the picture over the width of its margin.
-const PICTURE_SIDE_PER_MARGIN: u32 = 12;
 /// Splat radius of the points of a very small cloud, as a fraction of the picture's shorter side. The drawn dots are
 /// 1.4 times as wide.
 const DOT_RADIUS_PER_PICTURE_SIDE: f32 = 0.0045;

@@ -18,7 +18,7 @@ use super::{
 };
 
 /// Most points per byte of the file. Real data need a byte or more per point, but a chunk of equal points far less.
-pub(super) const MAX_RATIO: usize = 1024;
+pub(crate) const MAX_RATIO: usize = 1024;
 
 /// Points decompressed between two checks for cancellation.
 const CHECKED: usize = 1 << 16;

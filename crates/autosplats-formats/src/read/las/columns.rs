@@ -21,12 +21,12 @@ use rayon::prelude::*;
 use super::{
     super::Job,
     dimension::{Dimension, Source, zeroed},
-    extra::Extra,
-    header::{Header, bytes_at},
+    header::Header,
+    slices::{Slice, split, u16_at},
 };
 use crate::{
     color_scale::{ColorScale, Levels},
-    las::{self, ANGLE_STEP, Place},
+    las,
 };
 
 /// Points decoded between two checks for cancellation, and points of a preview chunk.
@@ -63,10 +63,23 @@ impl ValueFacts {
     }
 }
 
+/// How colours are read, which have 16 bits in the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Colors {
+    /// The values tell whether they have 8 or 16 bits.
+    #[default]
+    ByValue,
+    /// They have 16 bits, or else 8, as other points of the scan tell.
+    Settled { wide: bool },
+    /// They are left out.
+    Unwanted,
+}
+
 /// The values of all points.
 pub(super) struct Columns<'a> {
     header: &'a Header,
     origin: DVec3,
+    settled: Option<bool>,
     /// Byte offset of the colours in a record.
     colors_at: Option<usize>,
     dimensions: Vec<Dimension>,
@@ -88,8 +101,10 @@ impl<'a> Columns<'a> {
         exact: bool,
         mut dimensions: Vec<Dimension>,
         count: usize,
+        reading: Colors,
     ) -> Result<Self, Error> {
-        let colors_at = las::colors(header.format);
+        let colors_at = las::colors(header.format).filter(|_| reading != Colors::Unwanted);
+        let settled = if let Colors::Settled { wide } = reading { Some(wide) } else { None };
         if let (Some(at), true) = (colors_at, exact) {
             let color =
                 |(index, name): (usize, &str)| Dimension { name: name.into(), source: Source::Color(at + 2 * index) };
@@ -98,13 +113,15 @@ impl<'a> Columns<'a> {
         Ok(Self {
             header,
             origin,
+            settled,
             colors_at,
             positions: zeroed(count, "positions")?,
             residuals: zeroed(if exact { count } else { 0 }, "residuals")?,
             colors: zeroed(if colors_at.is_some() { count } else { 0 }, "colours")?,
             fields: dimensions.iter().map(|dimension| dimension.zeros(count)).collect::<Result<_, _>>()?,
             dimensions,
-            above_byte: AtomicUsize::new(0),
+            // Settled colours of 16 bits have more such values from the start.
+            above_byte: AtomicUsize::new(usize::from(settled == Some(true))),
             seen: ValueFacts::default(),
         })
     }
@@ -175,7 +192,16 @@ impl<'a> Columns<'a> {
 
     /// Number of values above 255 that are more than may be clipped, whatever colours follow.
     fn enough(&self) -> usize {
-        Levels::most_clipped(3 * self.colors.len())
+        match self.settled {
+            None => Levels::most_clipped(3 * self.colors.len()),
+            Some(true) => 0,
+            Some(false) => usize::MAX,
+        }
+    }
+
+    /// How many colour values were found where.
+    pub(super) fn levels(&self) -> Levels {
+        self.seen.levels
     }
 
     fn put_bright(&mut self) {
@@ -187,7 +213,7 @@ impl<'a> Columns<'a> {
     /// Takes the high bytes of all colours, if after all points so many exceed 8 bits that 16 are meant.
     fn settle_colors(&mut self) {
         let enough = self.enough();
-        if self.seen.levels.are_wide() {
+        if self.settled.is_none() && self.seen.levels.are_wide() {
             if *self.above_byte.get_mut() <= enough {
                 clear(&mut self.colors);
                 *self.above_byte.get_mut() = enough + 1;
@@ -230,7 +256,8 @@ impl<'a> Columns<'a> {
     /// Whether a field is kept: it is not all zero, or it is a 16-bit colour of which 8 bits lose some.
     fn is_recorded(&self, index: usize) -> bool {
         match self.dimensions[index].source {
-            Source::Color(_) => self.seen.lossy_colors,
+            // Of some points of a scan, other points may have colours that lose.
+            Source::Color(_) => self.seen.lossy_colors || self.settled.is_some() && self.seen.colors,
             _ => self.seen.fields.get(index).copied().unwrap_or(false),
         }
     }
@@ -254,10 +281,7 @@ impl<'a> Columns<'a> {
         self.settle_colors();
         let mut names = self.names().into_iter().peekable();
         let narrow = self.seen.colors && !self.seen.levels.are_wide();
-        let told = narrow.then(|| {
-            let all = || "no colour value exceeds 255; the 16-bit colours are read as 8 bits".to_owned();
-            ColorScale::of_levels(self.seen.levels, false).note().unwrap_or_else(all)
-        });
+        let told = narrow.then(|| narrow_note(self.seen.levels));
         let mut cloud = PointCloud::new(self.origin, self.positions).with_axes(Axes::ZUp);
         if self.seen.residuals {
             cloud = cloud.with_residuals(self.residuals)?;
@@ -272,6 +296,12 @@ impl<'a> Columns<'a> {
         }
         Ok((cloud, told))
     }
+}
+
+/// Note on 16-bit colours that are read as 8 bits.
+pub(crate) fn narrow_note(levels: Levels) -> String {
+    let all = || "no colour value exceeds 255; the 16-bit colours are read as 8 bits".to_owned();
+    ColorScale::of_levels(levels, false).note().unwrap_or_else(all)
 }
 
 /// A run of points with its part of every column.
@@ -353,115 +383,11 @@ impl Piece<'_> {
         for (color, channels) in self.colors[range].iter_mut().zip(colors.clone()) {
             *color = channels.map(|channel| channel.min(255) as u8);
         }
-        if above > 0 {
+        if above > 0 && self.enough < usize::MAX {
             let high = colors.map(|channels| channels.map(|channel| (channel >> 8) as u8)).enumerate();
             self.seen.bright.extend(high.filter(|(_, high)| *high != [0; 3]).map(|(i, high)| (first + i, high)));
         }
     }
-}
-
-macro_rules! slices {
-    ($($variant:ident($type:ty)),*) => {
-        /// Values of a field that a piece fills.
-        enum Slice<'a> {
-            $($variant(&'a mut [$type])),*
-        }
-
-        impl<'a> Slice<'a> {
-            fn from(values: &'a mut FieldValues, start: usize) -> Self {
-                match values {
-                    $(FieldValues::$variant(values) => Self::$variant(&mut values[start..])),*
-                }
-            }
-
-            /// Splits off the first values.
-            fn split(&mut self, count: usize) -> Self {
-                match self {
-                    $(Self::$variant(values) => Self::$variant(split(values, count))),*
-                }
-            }
-
-            /// Fills values from an unscaled value in the extra bytes; returns whether any is not zero.
-            fn take_plain<'r>(
-                &mut self,
-                range: Range<usize>,
-                extra: &Extra,
-                records: impl Iterator<Item = &'r [u8]> + Clone,
-            ) -> bool {
-                match self {
-                    $(Self::$variant(values) => {
-                        put(&mut values[range], records, |record| <$type>::from_le_bytes(bytes_at(record, extra.at)))
-                    }),*
-                }
-            }
-        }
-    };
-}
-slices!(U8(u8), I8(i8), U16(u16), I16(i16), U32(u32), I32(i32), U64(u64), I64(i64), F32(f32), F64(f64));
-
-impl Slice<'_> {
-    /// Fills values from some records; returns whether any is not zero.
-    fn take<'r>(
-        &mut self,
-        range: Range<usize>,
-        dimension: &Dimension,
-        records: impl Iterator<Item = &'r [u8]> + Clone,
-    ) -> bool {
-        match (self, &dimension.source) {
-            (Self::U8(v), &Source::Own(Place::Bits { at, shift, mask })) => {
-                put(&mut v[range], records, |record| record[at] >> shift & mask)
-            }
-            (Self::I8(v), &Source::Own(Place::I8(at))) => put(&mut v[range], records, |record| record[at] as i8),
-            (Self::U16(v), &(Source::Own(Place::U16(at)) | Source::Color(at))) => {
-                put(&mut v[range], records, |record| u16_at(record, at))
-            }
-            (Self::F32(v), &Source::Own(Place::Angle(at))) => {
-                put(&mut v[range], records, |record| f32::from(u16_at(record, at) as i16) * ANGLE_STEP)
-            }
-            (Self::F64(v), &Source::Own(Place::F64(at))) => {
-                put(&mut v[range], records, |record| f64::from_le_bytes(bytes_at(record, at)))
-            }
-            (Self::F64(v), Source::Extra(extra @ Extra { scaled: Some((scale, offset)), .. })) => {
-                put(&mut v[range], records, |record| match extra.number(record) {
-                    Some(number) => number * scale + offset,
-                    None => f64::NAN,
-                })
-            }
-            // Floats have NaN for a missing value; integers keep the file's marker.
-            (Self::F32(v), Source::Extra(extra)) if extra.no_data.is_some() => {
-                put(&mut v[range], records, |record| extra.number(record).map_or(f32::NAN, |number| number as f32))
-            }
-            (Self::F64(v), Source::Extra(extra)) if extra.no_data.is_some() => {
-                put(&mut v[range], records, |record| extra.number(record).unwrap_or(f64::NAN))
-            }
-            (slice, Source::Extra(extra)) => slice.take_plain(range, extra, records),
-            (_, Source::Own(_) | Source::Color(_)) => false,
-        }
-    }
-}
-
-/// Stores values unless all are zero; returns whether any is not zero.
-fn put<'r, T: Copy + Default + PartialEq>(
-    values: &mut [T],
-    records: impl Iterator<Item = &'r [u8]> + Clone,
-    value: impl Fn(&[u8]) -> T,
-) -> bool {
-    let zero = T::default();
-    if records.clone().all(|record| value(record) == zero) {
-        return false;
-    }
-    for (place, record) in values.iter_mut().zip(records) {
-        *place = value(record);
-    }
-    true
-}
-
-/// Splits off the first elements.
-fn split<'a, T>(slice: &mut &'a mut [T], count: usize) -> &'a mut [T] {
-    let whole = std::mem::take(slice);
-    let (first, rest) = whole.split_at_mut(count.min(whole.len()));
-    *slice = rest;
-    first
 }
 
 /// Removes ranges of elements, which must be in order.
@@ -482,11 +408,6 @@ fn remove<T: Copy>(values: &mut Vec<T>, ranges: &[Range<usize>]) {
 /// Makes colours black. Black ones are not written to: points that failed to decompress keep their memory untouched.
 fn clear(colors: &mut [[u8; 3]]) {
     colors.iter_mut().filter(|color| **color != [0; 3]).for_each(|color| *color = [0; 3]);
-}
-
-#[inline]
-fn u16_at(record: &[u8], at: usize) -> u16 {
-    u16::from_le_bytes(bytes_at(record, at))
 }
 
 /// Passes newly filled points to the caller as a preview chunk.

@@ -3,7 +3,7 @@
 use std::io::Cursor;
 
 use laz::{
-    LazItem, LazItemType,
+    DecompressionSelection, LazItem, LazItemType,
     record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor},
 };
 
@@ -17,7 +17,19 @@ pub(super) fn layered(items: &[LazItem]) -> bool {
 pub(super) type DynDecompressor<'a> = dyn RecordDecompressor<Cursor<&'a [u8]>> + Send + Sync + 'a;
 pub(super) type Decompressor<'a> = Box<DynDecompressor<'a>>;
 
-/// Makes a decompressor. Items on which damage would overflow the crate's stack are decoded by this project's code.
+/// Makes a [`decompressor`] of selected values; values that are not in layers are all decompressed.
+pub(super) fn selecting<'a>(
+    items: &[LazItem],
+    chunk: &'a [u8],
+    selection: DecompressionSelection,
+) -> Result<Decompressor<'a>, String> {
+    let mut decompressor = decompressor(items, chunk)?;
+    decompressor.set_selection(selection);
+    Ok(decompressor)
+}
+
+/// Makes a decompressor of all values. Items on which damage would overflow the crate's stack are decoded by this
+/// project's code.
 pub(super) fn decompressor<'a>(items: &[LazItem], chunk: &'a [u8]) -> Result<Decompressor<'a>, String> {
     let theirs = |decompressor: &mut dyn RecordDecompressor<Cursor<&'a [u8]>>, item: LazItem| {
         decompressor.set_fields_from(&vec![item]).map_err(|error| error.to_string())

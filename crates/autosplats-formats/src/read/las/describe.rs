@@ -4,8 +4,8 @@ use autosplats_cloud::{Error, shown_number};
 
 use super::super::{Attribute, Description, Job};
 use super::{
-    coordinates,
-    dimension::{Source, dimensions},
+    coordinates::{self, CoordinateSystem},
+    dimension::{Dimension, Source, dimensions},
     header::{Header, bytes_at},
     laz,
     records::Records,
@@ -21,7 +21,20 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let (dimensions, mut notes) = dimensions(&header, &records);
     notes.extend(records.notes.iter().cloned());
     let meaning = coordinates::of(&header, &records);
+    let mut description = of_records(&header, &records, &dimensions, &meaning);
     notes.extend(meaning.notes);
+    description.points = points(job, &mut header, &records, &mut notes);
+    description.notes.splice(..0, notes);
+    Ok(description)
+}
+
+/// The description by header and records, without the number of points.
+pub(super) fn of_records(
+    header: &Header,
+    records: &Records<'_>,
+    dimensions: &[Dimension],
+    meaning: &CoordinateSystem,
+) -> Description {
     let tree = records.find("copc", 1).filter(|record| record.data.len() == COPC_INFO && header.compressed);
 
     let coordinate = |(axis, scale): (&str, f64)| Attribute::new(axis, format!("int32 × {}", shown_number(scale)));
@@ -29,7 +42,7 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
         ["X", "Y", "Z"].into_iter().zip(header.scale.to_array()).map(coordinate).collect();
     let colors = ["Red", "Green", "Blue"].map(|name| Attribute::new(name, "uint16"));
     let mut colors = las::colors(header.format).map(|_| colors).into_iter().flatten().peekable();
-    for dimension in &dimensions {
+    for dimension in dimensions {
         let stored = match &dimension.source {
             Source::Own(place) => place.stored(),
             Source::Color(_) => "uint16".into(),
@@ -43,14 +56,14 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     }
     attributes.extend(colors);
 
-    let points = points(job, &mut header, &records, &mut notes);
+    let mut notes = Vec::new();
     // A header without a number of points was never finished.
     let bounds = header.sane_bounds().filter(|_| header.stated > 0);
     if header.stated > 0 && bounds.is_none() {
         notes.push("the bounds in the header cannot be those of the points".into());
     }
 
-    let mut details = details(&header, &records);
+    let mut details = details(header, records);
     if let Some(tree) = tree {
         details.extend(tree_details(tree.data));
     }
@@ -60,17 +73,16 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
         (None, true) => format!("{version}, point format {}, compressed (LAZ)", header.format),
         (None, false) => format!("{version}, point format {}", header.format),
     };
-    Ok(Description {
+    Description {
         format,
-        points,
         bounds,
         attributes,
-        crs: meaning.crs,
+        crs: meaning.crs.clone(),
         resolution: Some(header.scale.abs()),
         details,
         notes,
         ..Description::default()
-    })
+    }
 }
 
 /// The number of points, if it shows without decompressing; notes tell where the header states another.

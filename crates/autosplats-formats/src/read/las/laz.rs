@@ -13,13 +13,13 @@ use std::{
 };
 
 use autosplats_cloud::{Error, guard};
-use laz::{LazItem, LazItemType, LazVlr, record::RecordDecompressor};
+use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr, record::RecordDecompressor};
 
 use super::super::Job;
 use super::{
-    chunks::{Chunk, Chunks, MAX_RATIO},
-    columns::{BATCH, Columns, preview},
-    decompressor::{DynDecompressor, decompressor, layered},
+    chunks::{Chunk, Chunks, MAX_RATIO, layers},
+    columns::{BATCH, Columns, Piece, preview},
+    decompressor::{Decompressor, DynDecompressor, layered, selecting},
     header::Header,
     records::Records,
 };
@@ -40,10 +40,19 @@ pub(super) struct Compressed<'a> {
     /// Note on the chunks.
     pub(super) note: Option<String>,
     bytes: &'a [u8],
-    record_len: usize,
-    items: Vec<LazItem>,
+    /// How the records are compressed.
+    pub(super) layout: Layout,
     chunks: Vec<Chunk>,
+}
+
+/// How records are compressed, and which of their values are decompressed.
+#[derive(Clone)]
+pub(super) struct Layout {
+    items: Vec<LazItem>,
+    record_len: usize,
+    /// Whether the records are in chunks.
     chunked: bool,
+    pub(super) selection: DecompressionSelection,
 }
 
 impl<'a> Compressed<'a> {
@@ -58,14 +67,13 @@ impl<'a> Compressed<'a> {
             return Ok(None);
         }
         let fail = |what: String| job.malformed(format!("byte {}", header.point_data), what);
-        let (vlr, chunked) = compression(job, header, records)?;
-        check_items(vlr.items(), header).map_err(fail)?;
+        let (layout, vlr) = Layout::read(job, header, records)?;
         let most = MAX_RATIO.saturating_mul(job.bytes.len());
         if header.stated > most as u64 {
             return Err(fail(format!("{} points cannot be in a file of this size", header.stated)));
         }
         let Chunks { list: chunks, more, note, .. } =
-            guard(|| Chunks::find(job, header, &vlr, chunked, thorough)).map_err(fail)?;
+            guard(|| Chunks::find(job, header, &vlr, layout.chunked, thorough)).map_err(fail)?;
         let points = chunks.iter().map(|chunk| chunk.points).sum();
         if points > most {
             return Err(fail(format!("{points} points cannot be in a file of this size")));
@@ -76,16 +84,14 @@ impl<'a> Compressed<'a> {
             more,
             note,
             bytes: job.bytes,
-            record_len: header.record_len,
-            items: vlr.items().clone(),
+            layout,
             chunks,
-            chunked,
         }))
     }
 
     /// The first record of each chunk, which is not compressed.
     pub(super) fn first_records(&self) -> Vec<&'a [u8]> {
-        let first = |chunk: &Chunk| self.bytes[chunk.bytes.clone()].get(..self.record_len);
+        let first = |chunk: &Chunk| self.bytes[chunk.bytes.clone()].get(..self.layout.record_len);
         self.chunks.iter().filter_map(first).collect()
     }
 
@@ -93,7 +99,8 @@ impl<'a> Compressed<'a> {
     /// anywhere, and layers state their points.
     fn has_more(&self, chunk: &Chunk, decompressor: &DynDecompressor<'_>) -> bool {
         let last = self.chunks.last().is_some_and(|last| last.bytes == chunk.bytes);
-        self.chunked && last && !layered(&self.items) && decompressor.get().position() < chunk.bytes.len() as u64
+        let Layout { items, chunked, .. } = &self.layout;
+        *chunked && last && !layered(items) && decompressor.get().position() < chunk.bytes.len() as u64
     }
 
     /// Decompresses all points into columns. Returns the ranges of points that could not be decompressed, and whether
@@ -157,15 +164,7 @@ impl Filling<'_, '_> {
                 if chunk.inconsistent {
                     return Err("the lengths in a chunk are inconsistent; copy the file again".into());
                 }
-                let mut decompressor = decompressor(&file.items, &file.bytes[chunk.bytes.clone()])?;
-                let mut records = vec![0; PIECE.min(chunk.points) * file.record_len];
-                let mut left = chunk.points;
-                while left > 0 {
-                    let records = &mut records[..PIECE.min(left) * file.record_len];
-                    decompress(&mut *decompressor, records, file.record_len).map_err(|(_, what)| what)?;
-                    piece.take(records);
-                    left -= records.len() / file.record_len;
-                }
+                let decompressor = file.layout.take_chunk(&file.bytes[chunk.bytes.clone()], chunk.points, piece)?;
                 more.fetch_or(file.has_more(chunk, &*decompressor), Ordering::Relaxed);
                 Ok(())
             })
@@ -185,10 +184,11 @@ impl Filling<'_, '_> {
     fn long_chunk(&mut self, chunk: &Chunk) -> Result<(), Error> {
         let end = self.done + chunk.points;
         let file = self.file;
+        let layout = &file.layout;
         let input = &file.bytes[chunk.bytes.clone()];
         let opened = guard(|| match chunk.inconsistent {
             true => Err("the lengths in a chunk are inconsistent; copy the file again".into()),
-            false => decompressor(&file.items, input),
+            false => selecting(&layout.items, input, layout.selection),
         });
         let mut decompressor = match opened {
             Ok(decompressor) => decompressor,
@@ -198,22 +198,22 @@ impl Filling<'_, '_> {
                 return Ok(());
             }
         };
-        let mut buffer = vec![0; PIECE * file.record_len];
+        let mut buffer = vec![0; PIECE * layout.record_len];
         while self.done < end {
             self.tick()?;
             let start = self.done;
             let stop = end.min(start + BATCH / 4);
             while self.done < stop {
                 let count = PIECE.min(stop - self.done);
-                let records = &mut buffer[..count * file.record_len];
-                let outcome = guard(|| Ok(decompress(&mut *decompressor, records, file.record_len)));
+                let records = &mut buffer[..count * layout.record_len];
+                let outcome = guard(|| Ok(decompress(&mut *decompressor, records, layout.record_len)));
                 let (whole, why) = match outcome {
                     Ok(Ok(())) => (count, None),
                     Ok(Err((whole, what))) => (whole, Some(what)),
                     Err(what) => (0, Some(what)),
                 };
                 self.columns.fill(self.done, &[whole], |_, piece| {
-                    piece.take(&records[..whole * file.record_len]);
+                    piece.take(&records[..whole * layout.record_len]);
                     Ok(())
                 });
                 self.done += whole;
@@ -239,6 +239,45 @@ impl Filling<'_, '_> {
 
     fn tick(&self) -> Result<(), Error> {
         self.job.tick(self.done as f32 / self.file.points as f32)
+    }
+}
+
+impl Layout {
+    /// Reads the compression record.
+    pub(super) fn read(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Result<(Self, LazVlr), Error> {
+        let (vlr, chunked) = compression(job, header, records)?;
+        check_items(vlr.items(), header).map_err(|what| job.malformed(format!("byte {}", header.point_data), what))?;
+        let (items, record_len) = (vlr.items().clone(), header.record_len);
+        Ok((Self { items, record_len, chunked, selection: DecompressionSelection::all() }, vlr))
+    }
+
+    /// The same records, of which only these values are decompressed.
+    pub(super) fn selecting(&self, selection: DecompressionSelection) -> Self {
+        Self { selection, ..self.clone() }
+    }
+
+    /// Number of points that a chunk in layers states, if its layers fit into it.
+    pub(super) fn stated_points(&self, chunk: &[u8]) -> Option<usize> {
+        layered(&self.items).then(|| layers(chunk, &self.items, self.record_len)).flatten().map(|(points, _)| points)
+    }
+
+    /// Decompresses a chunk into its part of the columns. Returns the decompressor behind the last point.
+    pub(super) fn take_chunk<'a>(
+        &self,
+        chunk: &'a [u8],
+        points: usize,
+        piece: &mut Piece<'_>,
+    ) -> Result<Decompressor<'a>, String> {
+        let mut decompressor = selecting(&self.items, chunk, self.selection)?;
+        let mut records = vec![0; PIECE.min(points) * self.record_len];
+        let mut left = points;
+        while left > 0 {
+            let records = &mut records[..PIECE.min(left) * self.record_len];
+            decompress(&mut *decompressor, records, self.record_len).map_err(|(_, what)| what)?;
+            piece.take(records);
+            left -= records.len() / self.record_len;
+        }
+        Ok(decompressor)
     }
 }
 

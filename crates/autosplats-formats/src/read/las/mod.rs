@@ -17,10 +17,20 @@ mod describe;
 mod dimension;
 mod extra;
 mod gps_time;
+mod head;
 mod header;
 mod laz;
 mod point14;
 mod records;
+mod shape;
+mod slices;
+
+pub(crate) use self::{
+    chunks::MAX_RATIO,
+    columns::{Colors, narrow_note},
+    head::{Decoded, Head},
+    shape::{Shape, read_shaped},
+};
 
 use autosplats_cloud::{Contents, Error, Unit, degree_origin, sampled_middle};
 use glam::DVec3;
@@ -33,7 +43,6 @@ use self::{
     records::Records,
 };
 use super::{Format, Job};
-use crate::las;
 
 /// Uncompressed points that one thread decodes at a time.
 const RUN: usize = 1 << 13;
@@ -51,11 +60,20 @@ pub(super) const FORMAT: Format = Format {
 };
 
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
+    Ok(points(job, &Shape::default())?.cloud.into())
+}
+
+/// Reads the points, as far as `shape` wants them.
+fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
     let mut header = Header::read(job)?;
     let records = Records::read(job.bytes, &header);
-    let (dimensions, mut notes) = dimensions(&header, &records);
+    let (mut dimensions, mut notes) = dimensions(&header, &records);
+    shape.choose(&mut dimensions);
     notes.extend(records.notes.iter().cloned());
-    let compressed = if header.compressed { Compressed::open(job, &header, &records, true)? } else { None };
+    let mut compressed = if header.compressed { Compressed::open(job, &header, &records, true)? } else { None };
+    if let Some(compressed) = &mut compressed {
+        compressed.layout.selection = shape.selection(&dimensions);
+    }
     let (points, lost) = match &compressed {
         Some(compressed) => (compressed.points, compressed.missing),
         None => complete(job, &header)?,
@@ -66,21 +84,22 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     }
     notes.extend(header.more_than_stated(compressed.as_ref().map_or(header.held, |compressed| compressed.points)));
     let exact = job.options.exact;
-    let colors = las::colors(header.format).map_or(0, |_| if exact { 9 } else { 3 });
+    let colors = shape.color_bytes(&header, exact);
     let fields: usize = dimensions.iter().map(Dimension::size).sum();
     job.check_memory(points, if exact { 24 } else { 12 } + colors + fields)?;
 
     let meaning = coordinates::of(&header, &records);
     let degrees = meaning.crs.unit == Some(Unit::Degree);
     let records_at = |i: usize| &job.bytes[header.point_data + i * header.record_len..];
-    let origin = match &compressed {
-        Some(compressed) => {
+    let origin = match (shape.origin, &compressed) {
+        (Some(origin), _) => origin,
+        (None, Some(compressed)) => {
             let first = compressed.first_records();
             origin(&header, degrees, first.len(), |i| header.world(first[i]))
         }
-        None => origin(&header, degrees, points, |i| header.world(records_at(i))),
+        (None, None) => origin(&header, degrees, points, |i| header.world(records_at(i))),
     };
-    let mut columns = Columns::new(&header, origin, exact, dimensions, points)?;
+    let mut columns = Columns::new(&header, origin, exact, dimensions, points, shape.colors)?;
     let (damaged, more) = match &compressed {
         Some(compressed) => compressed.fill(job, &mut columns)?,
         None => {
@@ -90,6 +109,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     };
 
     columns.remove(&damaged);
+    let levels = columns.levels();
     let (cloud, narrow) = columns.into_cloud()?;
     notes.extend(narrow);
     let claimed = header.points;
@@ -107,7 +127,8 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     }
     notes.extend(meaning.notes);
     notes.iter().for_each(|note| job.note(note));
-    Ok(cloud.with_crs(meaning.crs).with_resolution(header.scale.abs()).into())
+    let lost = lost + damaged.iter().map(|range| range.len() as u64).sum::<u64>();
+    Ok(Decoded { cloud: cloud.with_crs(meaning.crs).with_resolution(header.scale.abs()), levels, lost })
 }
 
 /// The number of complete records, and the number of missing ones.

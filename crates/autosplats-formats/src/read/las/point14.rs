@@ -37,12 +37,26 @@ const CHANNELS: usize = 4;
 /// source; time. A layer is empty if its value is the same for all points.
 pub(super) const LAYERS: usize = 9;
 
+/// What selects each layer. The first is always decoded.
+const KINDS: [u32; LAYERS] = [
+    DecompressionSelection::XY_RETURNS_CHANNEL,
+    DecompressionSelection::Z,
+    DecompressionSelection::CLASSIFICATION,
+    DecompressionSelection::FLAGS,
+    DecompressionSelection::INTENSITY,
+    DecompressionSelection::SCAN_ANGLE,
+    DecompressionSelection::USER_DATA,
+    DecompressionSelection::POINT_SOURCE_ID,
+    DecompressionSelection::GPS_TIME,
+];
+
 type Layer = ArithmeticDecoder<Cursor<Vec<u8>>>;
 
 /// Decoder of POINT14 in the records of one chunk.
 pub(super) struct Point14 {
     /// Whether later items receive the channel of every point, or only where it changes, as the first writers had it.
     reports_channel: bool,
+    selection: DecompressionSelection,
     sizes: [u32; LAYERS],
     layers: [Option<Layer>; LAYERS],
     channels: [Option<Box<Channel>>; CHANNELS],
@@ -54,6 +68,7 @@ impl Point14 {
     pub(super) fn new(version: u16) -> Self {
         Self {
             reports_channel: version > 3,
+            selection: DecompressionSelection::all(),
             sizes: [0; LAYERS],
             layers: [const { None }; LAYERS],
             channels: [const { None }; CHANNELS],
@@ -71,8 +86,10 @@ impl<'a> LayeredFieldDecompressor<Cursor<&'a [u8]>> for Point14 {
         LEN
     }
 
-    /// Always decodes all values.
-    fn set_selection(&mut self, _: DecompressionSelection) {}
+    /// Values that are not selected stay those of the first point. No other value depends on them.
+    fn set_selection(&mut self, selection: DecompressionSelection) {
+        self.selection = selection;
+    }
 
     fn init_first_point(
         &mut self,
@@ -101,14 +118,16 @@ impl<'a> LayeredFieldDecompressor<Cursor<&'a [u8]>> for Point14 {
     }
 
     fn read_layers(&mut self, src: &mut Cursor<&'a [u8]>) -> io::Result<()> {
-        for (layer, size) in self.layers.iter_mut().zip(self.sizes) {
+        for ((layer, size), kind) in self.layers.iter_mut().zip(self.sizes).zip(KINDS) {
             *layer = None;
             if size > 0 {
                 let rest = usize::try_from(src.position()).ok().and_then(|at| src.get_ref().get(at..));
                 let bytes = rest.and_then(|rest| rest.get(..size as usize)).ok_or(ErrorKind::UnexpectedEof)?;
-                let mut decoder = ArithmeticDecoder::new(Cursor::new(bytes.to_vec()));
-                decoder.read_init_bytes()?;
-                *layer = Some(decoder);
+                if self.selection.0 & kind == kind {
+                    let mut decoder = ArithmeticDecoder::new(Cursor::new(bytes.to_vec()));
+                    decoder.read_init_bytes()?;
+                    *layer = Some(decoder);
+                }
                 src.set_position(src.position() + u64::from(size));
             }
         }

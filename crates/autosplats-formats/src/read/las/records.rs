@@ -42,6 +42,11 @@ impl<'a> Records<'a> {
         Self { all, notes }
     }
 
+    /// Adds an extended record, which begins with its header.
+    pub(super) fn add_extended(&mut self, bytes: &'a [u8]) {
+        walk(bytes, 0, 1, EVLR_HEADER, &mut self.all);
+    }
+
     pub(super) fn find(&self, user: &str, id: u16) -> Option<&Record<'a>> {
         self.all.iter().find(|record| record.id == id && record.user == user)
     }

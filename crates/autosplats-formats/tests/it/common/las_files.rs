@@ -29,8 +29,14 @@ impl Progress for Notes {
     }
 }
 
-pub(crate) const EXACT: ReadOptions =
-    ReadOptions { exact: true, keep_no_returns: true, columns: None, keep: None, depth_camera: None };
+pub(crate) const EXACT: ReadOptions = ReadOptions {
+    exact: true,
+    keep_no_returns: true,
+    columns: None,
+    keep: None,
+    headers: Vec::new(),
+    depth_camera: None,
+};
 
 pub(crate) fn load(bytes: &[u8]) -> (PointCloud, Vec<String>) {
     let notes = Notes::default();

@@ -1,0 +1,142 @@
+//! Pictures of octrees, of which what a picture needs is read.
+
+use std::time::Instant;
+
+use autosplats::{BYTES_PER_PIXEL, ColorMode, Detail, PlacedTree, Renderer, Shown, TreeScene};
+use autosplats_cloud::{Progress as _, Traffic, Unit, Wanted, available_memory};
+
+use super::job::Job;
+use super::report::TreeReport;
+use super::{Placed, milliseconds_since};
+use crate::device::Device;
+use crate::exit::{Exit, Failure};
+use crate::progress::{Bar, Notes};
+
+/// Memory of what is on its way from the file to the renderer, in bytes.
+const QUEUES: u64 = 64 << 20;
+/// Least memory for points, in bytes.
+const LEAST: u64 = 64 << 20;
+/// Bounds of the default memory, in bytes.
+const USUAL: [u64; 2] = [256 << 20, 2 << 30];
+
+/// The trees of the inputs, unless these are to be read whole.
+pub(super) fn trees(job: &Job) -> Result<Option<Vec<PlacedTree>>, Failure> {
+    match job.tree.detail {
+        Some(0.0) => Ok(None),
+        detail => job.inputs.trees(detail.is_some(), &job.console),
+    }
+}
+
+/// Renders one picture.
+pub(super) fn run(
+    mut job: Job,
+    trees: Vec<PlacedTree>,
+    renderer: &mut Renderer,
+    device: &Device,
+) -> Result<(), Failure> {
+    let started = Instant::now();
+    let bar = Bar::new(&format!("reading {}", job.inputs.names()), &job.console);
+    let names = job.inputs.names();
+    let notes = Notes::new(&bar, &names);
+    let scene = open(&job, trees, &notes)?;
+    let (camera, axes) = job.camera.place(scene.sample(), None, job.size)?;
+    let mut scene = scene.with_axes(axes);
+    job.settle_exposure(scene.sample());
+    job.settle_first_radius(renderer, scene.sample(), &camera)?;
+    let shown = scene.show(&camera, job.size, &detail(&job), &notes)?;
+    tell(&job, &mut scene, &shown, &notes)?;
+    let read = milliseconds_since(started);
+    let tree = Some(report(&scene, &shown, read));
+    drop(bar);
+    Placed { camera, axes, read, notes: Vec::new(), tree }.picture(job, renderer, device, scene.points().into())
+}
+
+/// How fine the points shall be.
+pub(super) fn detail(job: &Job) -> Detail {
+    Detail { spacing_px: job.tree.detail.unwrap_or(1.0), max_points: job.tree.points_budget, ..Detail::default() }
+}
+
+/// Opens the trees and reads the coarsest points, with the attributes that the picture shows.
+pub(super) fn open(job: &Job, trees: Vec<PlacedTree>, notes: &Notes<'_>) -> Result<TreeScene, Failure> {
+    for placed in &trees {
+        let info = placed.tree.info();
+        info.notes.iter().for_each(|note| notes.note(note));
+        if info.crs.unit == Some(Unit::Degree) {
+            let why =
+                "its coordinates are degrees, which only points that are read whole can be shown in; add --detail 0";
+            return Err(Failure::new(Exit::Input, format!("{}: {why}", placed.tree.name().display())));
+        }
+    }
+    let color = &job.settings.shading.color;
+    let field = match color {
+        ColorMode::Classification => Some("Classification"),
+        ColorMode::Field(name) => Some(&**name),
+        _ => None,
+    };
+    let has = |name: &str| {
+        let fields = trees.iter().flat_map(|placed| &placed.tree.info().fields);
+        fields.into_iter().any(|field| field.eq_ignore_ascii_case(name))
+    };
+    let wanted = Wanted {
+        colors: matches!(color, ColorMode::Auto | ColorMode::Rgb) || field.is_some_and(|name| !has(name)),
+        // All fields, if only to tell which ones there are.
+        fields: field.is_none_or(has).then(|| field.into_iter().map(str::to_owned).collect()),
+        keep: job.inputs.kept(),
+        ..Wanted::default()
+    };
+    let scene = TreeScene::open(trees, wanted, memory(job)?, notes)?;
+    job.check_color(scene.sample())?;
+    Ok(scene)
+}
+
+/// Memory for points, in bytes.
+fn memory(job: &Job) -> Result<u64, Failure> {
+    let [width, height] = job.rendered_size().map(u64::from);
+    let others = width * height * BYTES_PER_PIXEL + QUEUES;
+    let usual = || (available_memory().unwrap_or(USUAL[1]) / 4).clamp(USUAL[0], USUAL[1]).max(others + LEAST);
+    let asked = job.tree.memory.unwrap_or_else(usual);
+    if asked < others + LEAST {
+        let least = (others + LEAST).div_ceil(1 << 20);
+        return Err(Failure::usage(format!(
+            "--memory: this picture needs at least {least}M; allow more, or make it smaller"
+        )));
+    }
+    Ok(asked - others)
+}
+
+/// Tells what is missing in a picture.
+///
+/// # Errors
+/// If all of it is.
+pub(super) fn tell(job: &Job, scene: &mut TreeScene, shown: &Shown, notes: &Notes<'_>) -> Result<(), Failure> {
+    scene.take_notes().iter().for_each(|note| notes.note(note));
+    let [nodes, points] = shown.damaged;
+    if let Some(damage) = &shown.damage {
+        if nodes == shown.nodes as u64 {
+            return Err(Failure::new(Exit::Input, damage));
+        }
+        notes.note(&format!("{points} points in {nodes} nodes are damaged and missing; the first: {damage}"));
+    }
+    let asked = detail(job).spacing_px;
+    if shown.spacing_px > asked {
+        notes.note(&format!(
+            "neighbouring points are up to {:.1} pixels apart; a larger --points-budget or --memory shows finer ones",
+            shown.spacing_px
+        ));
+    }
+    Ok(())
+}
+
+/// What was read for a picture.
+pub(super) fn report(scene: &TreeScene, shown: &Shown, complete_ms: f64) -> TreeReport {
+    let Traffic { requests, bytes } = scene.traffic();
+    TreeReport {
+        stored_points: scene.trees().iter().map(|placed| placed.tree.info().points).sum(),
+        nodes: shown.nodes,
+        points: shown.points,
+        bytes,
+        requests,
+        spacing_px: shown.spacing_px,
+        complete_ms,
+    }
+}

@@ -1,0 +1,198 @@
+//! Octrees in every command, from files and from a server.
+
+use std::fs;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use autosplats_serve::Server;
+use serde_json::Value;
+
+use crate::common::{Folder, data};
+
+const LION: &str = "lion_takanawa.copc.laz";
+
+fn scans() -> Option<PathBuf> {
+    Some(data()?.join("scans"))
+}
+
+/// The report of `render --json` with these arguments, which write a picture.
+fn report(folder: &Folder, arguments: &[&str]) -> Value {
+    let usual = ["render", "--json", "--size", "240x180", "--supersample", "1", "--backend", "cpu"];
+    serde_json::from_str(&folder.succeed(&[&usual[..], arguments].concat()).stdout).expect("JSON")
+}
+
+/// Root of the mean square difference of two pictures, of 255.
+fn difference(folder: &Folder, a: &str, b: &str) -> f64 {
+    let [a, b] = [a, b].map(|name| image::open(folder.path(name)).expect("a picture").to_rgb8());
+    assert_eq!(a.dimensions(), b.dimensions());
+    let squares = a.as_raw().iter().zip(b.as_raw()).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2));
+    (squares.sum::<f64>() / a.as_raw().len() as f64).sqrt()
+}
+
+#[test]
+fn a_picture_needs_a_part_of_the_points_and_looks_like_all() {
+    let Some(scans) = scans() else { return };
+    let (folder, lion) = (Folder::new(), scans.join(LION).display().to_string());
+    let whole = report(&folder, &[&lion, "-o", "whole.png", "--save-camera", "cam.json"]);
+    assert!(whole.get("tree").is_none(), "few points are read whole: {whole}");
+    let camera = ["--camera", "cam.json"];
+    let mut points = Vec::new();
+    for (detail, most) in [("4", 12.0), ("1", 5.0), ("0.2", 1.5)] {
+        let name = format!("{detail}.png");
+        let report = report(&folder, &[&[&lion, "-o", &name, "--detail", detail], &camera[..]].concat());
+        let tree = &report["tree"];
+        assert_eq!(tree["stored_points"], 341_989);
+        assert!(tree["spacing_px"].as_f64().is_some_and(|px| px <= detail.parse().expect("a number")), "{tree}");
+        assert_eq!(report["counts"]["points"], tree["points"], "all that is loaded is drawn");
+        points.push(tree["points"].as_u64().expect("a number"));
+        let off = difference(&folder, "whole.png", &name);
+        assert!(off < most, "{detail} pixels: off by {off}");
+    }
+    assert!(points.is_sorted() && points[0] < points[2], "a finer picture has more points: {points:?}");
+    assert_eq!(points[2], 341_989, "the finest needs all");
+}
+
+#[test]
+fn pictures_are_the_same_however_points_come() {
+    let Some(scans) = scans() else { return };
+    let folder = Folder::new();
+    let server = Server::start(scans.clone(), Duration::from_millis(5)).expect("a server");
+    let (near, far) = (scans.join(LION).display().to_string(), server.address(LION));
+    let detail = ["--detail", "1"];
+    let local = report(&folder, &[&[&near, "-o", "near.png", "--threads", "1"], &detail[..]].concat());
+    let remote = report(&folder, &[&[&far, "-o", "far.png", "--threads", "4"], &detail[..]].concat());
+    assert_eq!(folder.read("near.png"), folder.read("far.png"), "a file and an address");
+    assert_eq!(local["tree"]["points"], remote["tree"]["points"]);
+    let (requests, bytes) = (remote["tree"]["requests"].as_u64(), remote["tree"]["bytes"].as_u64());
+    let counts = server.counts();
+    assert_eq!(requests, Some(counts.requests as u64), "requests are counted");
+    assert!(requests.is_some_and(|requests| requests <= 12), "few are needed: {requests:?}");
+    let size = fs::metadata(scans.join(LION)).expect("a file").len();
+    assert!(bytes.is_some_and(|bytes| bytes <= size + (128 << 10)), "nothing is read twice: {bytes:?} of {size}");
+}
+
+#[test]
+fn limits_make_pictures_coarser_and_say_so() {
+    let Some(scans) = scans() else { return };
+    let (folder, lion) = (Folder::new(), scans.join(LION).display().to_string());
+    let limited = ["render", &lion, "-o", "a.png", "--size", "400x300", "--detail", "0.5", "--points-budget", "100K"];
+    let outcome = folder.succeed(&limited);
+    assert!(outcome.stderr.contains("pixels apart; a larger --points-budget"), "{}", outcome.stderr);
+    folder.fail(&["render", &lion, "-o", "b.png", "--detail", "1", "--memory", "1M"], 2, &["--memory", "at least"]);
+    for wrong in ["-1", "nan", "x"] {
+        folder.fail(&["render", &lion, "-o", "b.png", "--detail", wrong], 2, &["--detail", "pixels"]);
+    }
+    folder.fail(&["render", &lion, "-o", "b.png", "--detail", "1", "--color", "Beauty"], 2, &["Beauty", "Intensity"]);
+    assert_eq!(folder.list(), ["a.png"], "nothing else is written");
+}
+
+#[test]
+fn colours_of_values_come_from_nodes() {
+    let Some(scans) = scans() else { return };
+    let (folder, star) = (Folder::new(), scans.join("lone_star.copc.laz").display().to_string());
+    report(&folder, &[&star, "-o", "whole.png", "--color", "intensity", "--save-camera", "cam.json"]);
+    report(&folder, &[&star, "-o", "part.png", "--color", "intensity", "--camera", "cam.json", "--detail", "0.1"]);
+    let off = difference(&folder, "whole.png", "part.png");
+    assert!(off < 1.5, "off by {off}");
+}
+
+#[test]
+fn parts_are_converted_without_the_rest() {
+    let Some(scans) = scans() else { return };
+    let folder = Folder::new();
+    let server = Server::start(scans.clone(), Duration::ZERO).expect("a server");
+    let (near, far) = (scans.join(LION).display().to_string(), server.address(LION));
+    let info: Value = serde_json::from_str(&folder.succeed(&["info", "--json", &near]).stdout).expect("JSON");
+    let corner = |name: &str| -> Vec<f64> { serde_json::from_value(info["bounds"][name].clone()).expect("numbers") };
+    let (low, high) = (corner("min"), corner("max"));
+    let middle: Vec<f64> = low.iter().zip(&high).map(|(a, b)| 0.5 * (a + b)).collect();
+    let bounds = [&low[..], &middle[..]].concat().iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    for (name, from) in [("whole.ply", &*near), ("near.ply", &near), ("far.ply", &far)] {
+        let whole = if name == "whole.ply" {
+            folder.succeed(&["convert", &near, "all.las"]);
+            "all.las"
+        } else {
+            from
+        };
+        folder.succeed(&["convert", whole, name, "--bounds", &bounds]);
+    }
+    let count = |name: &str| {
+        let report: Value =
+            serde_json::from_str(&folder.succeed(&["info", "--json", "--scan", name]).stdout).expect("JSON");
+        (report["points"].as_u64().expect("a number"), report["bounds"].clone())
+    };
+    let whole = count("whole.ply");
+    assert!(whole.0 > 1000, "{whole:?}");
+    assert_eq!(count("near.ply"), whole, "a part of the tree");
+    assert_eq!(folder.read("far.ply"), folder.read("near.ply"), "from a server as well");
+    folder.succeed(&["convert", &near, "coarse.ply", "--spacing", "1e9"]);
+    let root = count("coarse.ply").0;
+    assert!(root > 10_000 && root < 60_000, "the root alone: {root}");
+    folder.fail(&["convert", "whole.ply", "b.ply", "--spacing", "1"], 4, &["whole.ply", "no octree", "--voxel"]);
+    let beside = "1e7,1e7,1e7,2e7,2e7,2e7";
+    folder.fail(&["convert", &near, "b.ply", "--bounds", beside], 3, &["none of the 341989 points", "--bounds"]);
+    folder.succeed(&["normals", &far, "n.ply", "--bounds", &bounds]);
+    assert_eq!(count("n.ply").0, whole.0, "normals of the same part");
+}
+
+#[test]
+fn addresses_are_described_and_read() {
+    let Some(scans) = scans() else { return };
+    let folder = Folder::new();
+    let server = Server::start(scans.clone(), Duration::ZERO).expect("a server");
+    let near = scans.join(LION).display().to_string();
+    let describe = |name: &str| {
+        let mut report: Value = serde_json::from_str(&folder.succeed(&["info", "--json", name]).stdout).expect("JSON");
+        for own in ["input", "file_bytes"] {
+            report.as_object_mut().expect("an object").remove(own);
+        }
+        report
+    };
+    let before = server.counts().bytes;
+    assert_eq!(describe(&server.address(LION)), describe(&near));
+    assert!(server.counts().bytes - before < 200_000, "the points are not read");
+    folder.fail(&["info", &server.address("no.copc.laz")], 3, &["no.copc.laz", "404"]);
+    folder.fail(&["render", &server.address("no.copc.laz"), "-o", "a.png"], 3, &["no.copc.laz", "404"]);
+    folder.fail(&["render", "https://", "-o", "a.png"], 3, &["https://"]);
+    // What is no octree is read whole.
+    folder.write("a.xyz", "0 0 0\n1 0 0\n0 1 0\n");
+    let own = Server::start(folder.path(""), Duration::ZERO).expect("a server");
+    folder.succeed(&["convert", &own.address("a.xyz"), "b.ply"]);
+    assert!(folder.list().contains(&"b.ply".to_owned()));
+}
+
+#[test]
+fn a_camera_flies_through_views() {
+    let Some(scans) = scans() else { return };
+    let (folder, lion) = (Folder::new(), scans.join(LION).display().to_string());
+    let size = ["--size", "120x90", "--backend", "cpu"];
+    for (view, name) in [("front", "a.json"), ("right", "b.json")] {
+        let still = ["render", &lion, "-o", "still.png", "--view", view, "--save-camera", name, "--supersample", "1"];
+        folder.succeed(&[&still[..], &size].concat());
+    }
+    fs::remove_file(folder.path("still.png")).expect("a picture");
+    let path = ["--camera-path", "a.json,b.json", "--duration", "1s", "--fps", "4", "--json"];
+    for detail in ["0", "2"] {
+        let name = format!("{detail}_%d.png");
+        let fly = ["render", &lion, "-o", &name, "--detail", detail];
+        let lines = folder.succeed(&[&fly[..], &path, &size].concat()).stdout;
+        let reports: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+        assert_eq!(reports.len(), 5, "both ends are shown");
+        assert_eq!(
+            reports.iter().filter(|report| report.get("tree").is_some()).count(),
+            if detail == "2" { 5 } else { 0 }
+        );
+    }
+    for frame in 0..5 {
+        let off = difference(&folder, &format!("0_{frame}.png"), &format!("2_{frame}.png"));
+        assert!(off < 20.0, "frame {frame} is off by {off}");
+    }
+    assert_ne!(folder.read("0_0.png"), folder.read("0_4.png"));
+    // A frame is the same alone.
+    folder.succeed(&[&["render", &lion, "-o", "one.png", "--detail", "2", "--frames", "3"], &path[..], &size].concat());
+    assert_eq!(folder.read("one.png"), folder.read("2_3.png"));
+    let refused = |arguments: &[&str], words: &[&str]| folder.fail(&[&["render", &lion], arguments].concat(), 2, words);
+    refused(&["-o", "x.png", "--camera-path", "a.json,b.json"], &["--camera-path", "film"]);
+    refused(&["-o", "x_%d.png", "--camera-path", "a.json"], &["--camera-path", "two"]);
+    refused(&["-o", "x_%d.png", "--camera-path", "a.json,no.json"], &["no.json"]);
+}
