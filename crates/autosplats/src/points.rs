@@ -11,6 +11,9 @@ use glam::DVec3;
 
 use crate::camera::{PlacedView, View};
 
+/// Shift of the indices of a whole cloud to its slot. A shift by all 32 bits is undefined.
+pub(crate) const WHOLE_SHIFT: u32 = u32::BITS - 1;
+
 /// Points to render: a whole cloud, or the chosen nodes of a pool.
 ///
 /// # Examples
@@ -98,8 +101,7 @@ impl<'a> Points<'a> {
     /// Binary logarithm of the number of successive indices whose points have one origin.
     pub(crate) fn slot_shift(self) -> u32 {
         match self {
-            // All indices, up to one bit: a shift by all 32 is undefined.
-            Self::Cloud(_) => u32::BITS - 1,
+            Self::Cloud(_) => WHOLE_SHIFT,
             Self::Pool(_) => SLOT_SHIFT,
         }
     }

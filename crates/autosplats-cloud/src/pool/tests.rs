@@ -3,7 +3,7 @@
 use super::*;
 use crate::{Axes, Random, Scan};
 
-const SLOTS: usize = 12;
+const SLOTS: usize = 9;
 
 /// Keys of the third level.
 fn key(number: u32) -> NodeKey {
@@ -61,19 +61,19 @@ fn nodes_come_and_go_and_points_stay() {
     for number in 0..200 {
         match random.modulo(8) {
             0 => {
-                let removed = key(random.modulo(24) as u32);
+                let removed = key(random.modulo(12) as u32);
                 assert_eq!(pool.remove(removed), nodes.remove(&removed).is_some());
                 chosen.remove(&removed);
             }
             1 | 2 => {
-                let wanted: Vec<NodeKey> = (0..4).map(|_| key(random.modulo(24) as u32)).collect();
+                let wanted: Vec<NodeKey> = (0..6).map(|_| key(random.modulo(12) as u32)).collect();
                 let missing: BTreeSet<NodeKey> = pool.choose(&wanted).into_iter().collect();
                 chosen = wanted.into_iter().collect();
                 assert_eq!(missing, chosen.iter().filter(|key| !nodes.contains_key(key)).copied().collect());
                 chosen.retain(|key| nodes.contains_key(key));
             }
             _ => {
-                let (key, len) = (key(random.modulo(24) as u32), random.modulo(3 * SLOT_POINTS));
+                let (key, len) = (key(random.modulo(12) as u32), random.modulo(3 * SLOT_POINTS));
                 let before: Vec<_> = nodes.keys().map(|&key| (key, pool.index_of(key, 0))).collect();
                 let made = node(number, len);
                 if pool.insert(key, &made) {

@@ -141,14 +141,21 @@ pub(crate) struct AdaptBuffers {
     statistics: wgpu::Buffer,
     /// Owned by [`DepthNoiseBuffer`].
     depth_noise: wgpu::Buffer,
+    /// [`PointNames`](crate::project::PointNames), owned by the cloud on the device.
+    names: wgpu::Buffer,
 }
 
 impl AdaptBuffers {
-    /// Allocates for pictures of `size`; `known` holds the noise of the cloud.
+    /// Allocates for pictures of `size`; `known` holds the noise of the cloud, `names` its points' names.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
-    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], known: &DepthNoiseBuffer) -> Result<Self, Error> {
+    pub(crate) fn new(
+        gpu: &Gpu,
+        size: [u32; 2],
+        known: &DepthNoiseBuffer,
+        names: &wgpu::Buffer,
+    ) -> Result<Self, Error> {
         let most_finest = most_finest(gpu.most_bound());
         let sheet_cells = most_sheet_cells(size, most_finest);
         Ok(Self {
@@ -167,6 +174,7 @@ impl AdaptBuffers {
             quantiles: gpu.storage::<Quantile>("quantiles of scatter", SAMPLE_PARTS * SCALES + STEADY_SCALES)?,
             statistics: gpu.storage::<FrameStatistics>("statistics of surfels", 1)?,
             depth_noise: known.runs.clone(),
+            names: names.clone(),
         })
     }
 
@@ -326,12 +334,12 @@ impl AdaptPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
         let AdaptBuffers { levels, arguments, clusters, asked, sheets, .. } = buffers;
-        let AdaptBuffers { picked, sampled, scatters, quantiles, statistics, depth_noise, .. } = buffers;
+        let AdaptBuffers { picked, sampled, scatters, quantiles, statistics, depth_noise, names, .. } = buffers;
         let mut steps = Vec::new();
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
             steps.extend([
-                self.pick.step(gpu, &[counters, surfels, picked], screen.groups(round.work_64())),
+                self.pick.step(gpu, &[counters, surfels, names, picked], screen.groups(round.work_64())),
                 self.sample.step(gpu, &[surfels, picked, sampled], (MOST_SAMPLED as u32).div_ceil(SMALL_GROUP)),
                 self.scatter.step(gpu, &balls, (SCALES * MOST_SAMPLED) as u32),
                 self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], (SAMPLE_PARTS * SCALES) as u32),

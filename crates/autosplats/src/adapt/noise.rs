@@ -11,7 +11,7 @@ use super::sheets::SHEET_LEVELS;
 use super::{SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
-use crate::project::DensityGrid;
+use crate::project::{DensityGrid, PointNames};
 
 /// Expected number of sampled surfels; with no more surfels than this, nearly all are sampled.
 pub(crate) const NOISE_SAMPLE_COUNT: usize = 1024;
@@ -156,6 +156,7 @@ pub(crate) fn measure(
     density: &DensityGrid,
     view: &View,
     k: u32,
+    names: &PointNames,
 ) -> FrameStatistics {
     let of = |surfel: Surfel| {
         let radius = first_radius(&surfel, density, view, k);
@@ -163,7 +164,7 @@ pub(crate) fn measure(
     };
     let below = picked_below(surfels.len());
     // A dropped point has no ball.
-    let is_picked = |surfel: &&Surfel| !surfel.is_dropped() && hash_index(surfel.source) < below;
+    let is_picked = |surfel: &&Surfel| !surfel.is_dropped() && hash_index(names.of(surfel.source)) < below;
     let mut sample: Vec<Sampled> =
         surfels.par_iter().with_min_len(PICK_TASK).filter(is_picked).copied().map(of).collect();
     sample.truncate(MOST_SAMPLED);
@@ -185,7 +186,7 @@ pub(crate) fn measure(
     FrameStatistics { noise, k_radius, sheet_level }
 }
 
-/// Limit of the [`hash_index`] point index below which a surfel is sampled, for a number of surfels. Choosing by point
+/// Limit of the [`hash_index`] of a point's name below which a surfel is sampled, for a number of surfels. Choosing by point
 /// keeps the sample nearly the same from frame to frame. Choosing by place, one more surfel would change all of it.
 fn picked_below(surfels: usize) -> u32 {
     (u32::MAX / surfels.max(NOISE_SAMPLE_COUNT) as u32).saturating_mul(NOISE_SAMPLE_COUNT as u32)

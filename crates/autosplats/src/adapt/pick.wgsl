@@ -1,13 +1,19 @@
 // Picks the sample: an invocation per surfel. See the CPU form.
 //
-// Reads: counters, surfels. Writes: picked, the unordered indices of the sampled surfels, then their number.
+// Reads: counters, surfels, names. Writes: picked, the unordered indices of the sampled surfels, then their number.
 
 #import groups
 #import surfel
 
 @group(0) @binding(0) var<storage, read> counters: array<u32>;
 @group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
-@group(0) @binding(2) var<storage, read_write> picked: array<atomic<u32>>;
+// Binary logarithm of the number of points in a slot, then the name of the first point of each slot.
+@group(0) @binding(2) var<storage, read> names: array<u32>;
+@group(0) @binding(3) var<storage, read_write> picked: array<atomic<u32>>;
+
+fn name_of(index: u32) -> u32 {
+    return names[1u + (index >> names[0])] + (index & ((1u << names[0]) - 1u));
+}
 
 fn hash_index(number: u32) -> u32 {
     let first = (number ^ (number >> 16u)) * 0x85ebca6bu;
@@ -21,7 +27,7 @@ fn pick(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     let len = counters[ACTIVE];
     let below = (0xffffffffu / max(len, NOISE_SAMPLE_COUNT)) * NOISE_SAMPLE_COUNT;
     // A dropped point has no ball.
-    if place < len && hash_index(surfels[place].source) < below && surfels[place].radius > 0.0 {
+    if place < len && hash_index(name_of(surfels[place].source)) < below && surfels[place].radius > 0.0 {
         let at = atomicAdd(&picked[MOST_SAMPLED], 1u);
         if at < MOST_SAMPLED {
             atomicStore(&picked[at], place);

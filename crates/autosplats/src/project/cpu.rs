@@ -58,6 +58,7 @@ impl Projector {
         let keys = Keys::settle(keys, view, halves);
         let spacing_px = keys.mean_spacing();
         compact(&points, view, &keys, spacing_px, screen);
+        screen.names = points.names;
         measure_density(screen, view, spacing_px, k);
         split(rules, view, screen);
         screen

@@ -86,12 +86,19 @@ pub(crate) struct DeviceCloud {
     /// Words of values per point.
     words: usize,
     chunks: Vec<Chunk>,
+    /// [`PointNames`](super::PointNames); `None` until the first resize.
+    names: Option<wgpu::Buffer>,
 }
 
 impl DeviceCloud {
     /// The chunks, in the order of points.
     pub(crate) fn chunks(&self) -> &[Chunk] {
         &self.chunks
+    }
+
+    /// Names of the points, once there is [room](Self::resize) for any.
+    pub(crate) fn names(&self) -> Option<&wgpu::Buffer> {
+        self.names.as_ref()
     }
 
     /// Number of points that fit.
@@ -134,6 +141,10 @@ impl DeviceCloud {
                 chunks.push(Chunk { capacity: capacity as u32, uniform, positions, values });
             }
             (self.capacity, self.chunks) = (grown, chunks);
+        }
+        if self.names.is_none() {
+            // The shift, and at least the two slots of a cloud.
+            self.names = Some(gpu.storage::<u32>("names of points", self.capacity.div_ceil(SLOT_POINTS) + 3)?);
         }
         (self.points, self.slot_shift) = (points, of.slot_shift());
         self.write_uniforms(gpu);
@@ -180,6 +191,9 @@ impl DeviceCloud {
     /// Writes what the next frame projects: all points of a table.
     pub(crate) fn write_slots(&self, gpu: &Gpu, table: &SlotTable<'_>) {
         let slots = table.on_device();
+        if let Some(names) = &self.names {
+            gpu.queue.write_buffer(names, 0, bytemuck::cast_slice(&table.names.on_device()));
+        }
         let mut first = 0;
         for chunk in &self.chunks {
             let at = first >> self.slot_shift;

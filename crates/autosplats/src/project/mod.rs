@@ -32,7 +32,7 @@ pub(crate) use cpu::Projector;
 pub(crate) use device_cloud::ChunkUniform;
 pub(crate) use device_cloud::{Chunk, DeviceCloud, PointValues, Uploader};
 pub(crate) use sixteenths::{Sixteenths, half_at};
-pub(crate) use slots::SlotTable;
+pub(crate) use slots::{PointNames, SlotTable};
 
 use bytemuck::{Pod, Zeroable};
 
@@ -96,6 +96,7 @@ pub(crate) struct ScreenPoints {
     pub(crate) points: Vec<ScreenPoint>,
     /// Index in the cloud of each screen point.
     pub(crate) source: Vec<u32>,
+    pub(crate) names: PointNames,
     pub(crate) cells: ScreenCells,
     pub(crate) density: DensityGrid,
     /// Indices of the screen points to reconstruct first, ascending.

@@ -9,7 +9,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::camera::View;
-use crate::points::Points;
+use crate::points::{Points, WHOLE_SHIFT};
 
 /// The points of a frame by slots.
 #[derive(Debug)]
@@ -19,6 +19,36 @@ pub(crate) struct SlotTable<'a> {
     shift: u32,
     /// Eye about the origin of each slot.
     eyes: Vec<Vec3>,
+    pub(super) names: PointNames,
+}
+
+/// Numbers by which points are sampled, by slots. Points of a pool are numbered in the order of its runs, as those of a
+/// cloud are: the slots that they happen to lie in make no difference.
+#[derive(Clone, Debug)]
+pub(crate) struct PointNames {
+    shift: u32,
+    /// Name of the first point of each slot.
+    first: Vec<u32>,
+}
+
+impl Default for PointNames {
+    /// The names of a cloud, which are the indices.
+    fn default() -> Self {
+        Self { shift: WHOLE_SHIFT, first: vec![0, 1 << WHOLE_SHIFT] }
+    }
+}
+
+impl PointNames {
+    /// The name of the point at an index.
+    #[inline(always)]
+    pub(crate) fn of(&self, index: u32) -> u32 {
+        self.first[(index >> self.shift) as usize].wrapping_add(index & ((1 << self.shift) - 1))
+    }
+
+    /// The shift, then the first name of each slot, as `pick.wgsl` reads them.
+    pub(crate) fn on_device(&self) -> Vec<u32> {
+        [&[self.shift], self.first.as_slice()].concat()
+    }
 }
 
 /// What the device knows of a slot: four numbers behind the positions, read in `shared/cloud_points.wgsl`.
@@ -41,9 +71,15 @@ impl<'a> SlotTable<'a> {
     pub(crate) fn new(points: Points<'a>, view: &View) -> Self {
         let (shift, runs) = (points.slot_shift(), points.runs());
         let slots = runs.iter().map(|run| (run.first >> shift) as usize + 1).max().unwrap_or(0);
-        let mut eyes = vec![Vec3::ZERO; slots];
-        runs.iter().for_each(|run| eyes[(run.first >> shift) as usize] = view.about(run.origin).eye_local);
-        Self { positions: points.positions(), runs, shift, eyes }
+        let (mut eyes, mut first) = (vec![Vec3::ZERO; slots], vec![0; slots]);
+        let mut named = 0u32;
+        for run in &runs {
+            let slot = (run.first >> shift) as usize;
+            eyes[slot] = view.about(run.origin).eye_local;
+            first[slot] = named;
+            named = named.wrapping_add(run.len);
+        }
+        Self { positions: points.positions(), runs, shift, eyes, names: PointNames { shift, first } }
     }
 
     /// Position in view space of the point at an index.

@@ -130,7 +130,7 @@ fn settled(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Positions
 /// Checks owners, drops, sixteenths, order, starts of cells, density grid and the split by depth.
 fn compare(screen: &ScreenPoints, oracle: &Oracle, camera: &Camera, size: [u32; 2]) -> Result<(), String> {
     let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(what.to_owned()) };
-    let ScreenPoints { points, source, cells, density, active, passive, sixteenths, dropped } = screen;
+    let ScreenPoints { points, source, cells, density, active, passive, sixteenths, dropped, .. } = screen;
     ensure(*dropped == oracle.dropped, &format!("dropped {dropped:?}, not {:?}", oracle.dropped))?;
     for (pixel, [x, y]) in (0..size[1] as usize).flat_map(|y| (0..size[0] as usize).map(move |x| [x, y])).enumerate() {
         let expected = oracle.sixteenths.get(&[x, y]).copied().unwrap_or(0);

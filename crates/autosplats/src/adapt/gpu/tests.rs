@@ -28,7 +28,8 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> DeviceResults {
     let screen = upload_screen(gpu, &case.screen, &case.view);
     let mut known = DepthNoiseBuffer::new(gpu).expect("room");
     known.write(gpu, &case.known).expect("room");
-    let buffers = AdaptBuffers::new(gpu, screen.size, &known).expect("room");
+    let names = gpu.storage_with("names", &case.screen.names.on_device()).expect("room");
+    let buffers = AdaptBuffers::new(gpu, screen.size, &known, &names).expect("room");
     let fitted = case.fitted.concat();
     let surfels = surfel_buffer(gpu, screen.capacity).expect("room");
     gpu.queue.write_buffer(&surfels, 0, bytemuck::cast_slice(&fitted));
