@@ -108,7 +108,7 @@ impl Rules {
         let averaged = [of_same, settings.frames_averaged];
         Self {
             margin_px,
-            project: ProjectRules { k, halves, grid_culling: settings.grid_culling },
+            project: ProjectRules { k, halves, grid_culling: settings.grid_culling, near: margin_px > 0 },
             search: (mode != Mode::Given).then_some(SearchRules {
                 k,
                 outlier_expansions,

@@ -7,6 +7,7 @@ use autosplats::{Backend, Error, Renderer};
 
 mod backends;
 mod kd_tree;
+mod near;
 mod properties;
 mod sensors;
 mod smoothing;

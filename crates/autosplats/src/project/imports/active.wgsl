@@ -6,6 +6,6 @@
 #import screen
 
 fn is_active(point: ScreenPoint, cell: DensityCell, cell_px: u32) -> bool {
-    let is_culled = frame.grid_culling == 1u && point.position_view.z > culling_depth(cell.nearest, cell_px);
+    let is_culled = !has_near_flag(point.pixel) && frame.grid_culling == 1u && point.position_view.z > culling_depth(cell.nearest, cell_px);
     return matters(point, cell, cell_px) && !is_culled;
 }
