@@ -174,6 +174,11 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let own_radius = initial_radius_of(cell.count, cell_px, surfel.center.z);
     // A line has no width to draw.
     surfel.major_ratio = select(min(surfel.major_ratio, frame.longest), 1.0, is_line(surfel));
+    if is_near(surfel) {
+        // Cells lack the neighbours of near points.
+        surfels[place] = surfel;
+        return;
+    }
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
     let is_noisy = calls(surfel, noise, enough);
     var surface = Surface();
