@@ -92,7 +92,8 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
     if sum.weight > 0.0 {
         let per_total = 1.0 / sum.weight;
         sum.offset *= per_total;
-        sum.normal = normalize(sum.normal);
+        // Weights may be so small that their squares are zero.
+        sum.normal = normalize(sum.normal * per_total);
         sum.curvature *= per_total;
     } else {
         sum.weight = select(0.0, -1.0, disagrees);

@@ -19,8 +19,10 @@ use crate::camera::View;
 
 /// Cells along the side of a face of the cube of directions.
 pub(super) const FACE_CELLS: usize = 8;
-/// Octaves of distance, from the near plane on; nearer and more distant points share the cells of the first and last.
-pub(super) const OCTAVES: usize = 32;
+/// Octaves of distance; nearer and more distant points share the cells of the first and last.
+pub(super) const OCTAVES: usize = 20;
+/// The first octave ends this many octaves beyond the near plane, at a thousandth of the way to where the eye looks.
+pub(super) const FIRST_OCTAVE: u32 = 6;
 /// Number of cells.
 pub(crate) const NEAR_CELLS: usize = OCTAVES * 6 * FACE_CELLS * FACE_CELLS;
 /// Most points of a sparse cell.
@@ -50,7 +52,7 @@ pub(super) struct NearCells {
 
 /// Number of the first octave for a near plane.
 pub(super) fn first_octave(near: f32) -> u32 {
-    (near.to_bits() >> 23) + 1
+    (near.to_bits() >> 23) + FIRST_OCTAVE
 }
 
 /// Cell of a position in view space.

@@ -133,7 +133,7 @@ fn extent(c: f32, cz: f32, axes: vec2f, across: vec2f, center_px: f32, size: u32
         let root = sqrt(max(square, 0.0));
         low = (qb - root) / qa;
         high = (qb + root) / qa;
-        if !(qa > 0.0 && cz > 0.0) {
+        if qa <= 0.0 || cz <= 0.0 {
             // The disc meets the plane of the eye. It ends at the lines of sight that touch it in front of the eye.
             var range = vec2f(-infinity(), infinity());
             if square > 0.0 {

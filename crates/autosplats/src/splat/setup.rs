@@ -152,7 +152,7 @@ fn extent(axis: usize, center: [f32; 3], a: [f32; 3], b: [f32; 3], center_px: f3
         let square = qb * qb - qa * qc;
         let root = square.max(0.0).sqrt();
         (low, high) = ((qb - root) / qa, (qb + root) / qa);
-        if !(qa > 0.0 && cz > 0.0) {
+        if qa <= 0.0 || cz <= 0.0 {
             // The disc meets the plane of the eye. It ends at the lines of sight that touch it in front of the eye.
             let tangents = if square > 0.0 { [low, high] } else { [f32::NAN; 2] };
             [low, high] = front_extent(tangents, [c, cz], [a[axis], a[2]], [b[axis], b[2]]);

@@ -44,13 +44,15 @@ fn hit((from, direction): (DVec3, DVec3), height: &dyn Fn(DVec2) -> f64) -> Opti
     steps.into_iter().find(|along| below(from + direction * *along))
 }
 
-/// Asserts that all pixels whose line of sight meets the near ground are covered, at about that distance.
+/// Asserts that pixels whose line of sight meets the near ground are covered, at about that distance. One in
+/// `per_open` may be open.
 fn closed(
     renderer: &mut Renderer,
     cloud: &PointCloud,
     camera: &Camera,
     size: [u32; 2],
     height: &dyn Fn(DVec2) -> f64,
+    per_open: usize,
     case: &str,
 ) {
     let settings = Settings { all_layers: true, ..Settings::default() };
@@ -68,7 +70,7 @@ fn closed(
         off += usize::from((shown - distance).abs() > 0.4 + 0.15 * distance);
     }
     assert!(all > 0, "{case}: the ground is not in the picture");
-    assert_eq!(open, 0, "{case}: {open} of {all} pixels of the ground are open");
+    assert!(open.saturating_mul(per_open) <= all, "{case}: {open} of {all} pixels of the ground are open");
     assert!(off * 20 <= all, "{case}: {off} of {all} pixels show the ground elsewhere");
 }
 
@@ -89,7 +91,13 @@ fn cameras(eye: DVec3, fov_deg: f64) -> impl Iterator<Item = (String, Camera)> {
 fn ground_under_the_eye_is_closed() {
     for (mut renderer, backend) in crate::renderers().into_iter().zip(["CPU", "GPU"]) {
         for (name, height) in GROUNDS {
-            for (kind, grid, noise) in [("at random", false, 0.0), ("on a grid", true, 0.0), ("rough", false, 0.05)] {
+            // Noise tilts discs, so that lines of sight along the ground pass between a few.
+            for (kind, grid, noise, per_open) in [
+                ("at random", false, 0.0, usize::MAX),
+                ("on a grid", true, 0.0, usize::MAX),
+                ("rough", false, 0.05, 500),
+                ("rougher", false, 0.1, 500),
+            ] {
                 let cloud = ground(height, grid, noise, 60);
                 let height = |at: DVec2| f64::from(height(at.as_vec2().to_array()));
                 for above in [0.5, 1.0, 1.7, 3.0, 5.0] {
@@ -100,7 +108,7 @@ fn ground_under_the_eye_is_closed() {
                         for (view, camera) in cameras(eye, fov_deg) {
                             let case = format!("{name} {kind}, {above} above, {view}, {backend}");
                             if above < REACH * (0.5 * fov_deg).to_radians().sin() {
-                                closed(&mut renderer, &cloud, &camera, size, &height, &case);
+                                closed(&mut renderer, &cloud, &camera, size, &height, per_open, &case);
                             }
                         }
                     }

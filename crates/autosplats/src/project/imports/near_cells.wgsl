@@ -26,7 +26,7 @@ fn near_cell(at: vec3f) -> u32 {
     face += u32(along < 0.0);
     let half = 0.5 * f32(FACE_CELLS);
     let place = min(vec2u(max(aside * (half / most) + half, vec2f(0.0))), vec2u(FACE_CELLS - 1u));
-    let first_octave = (bitcast<u32>(frame.near) >> 23u) + 1u;
+    let first_octave = (bitcast<u32>(frame.near) >> 23u) + FIRST_OCTAVE;
     let exponent = bitcast<u32>(most) >> 23u;
     let octave = min(max(exponent, first_octave) - first_octave, OCTAVES - 1u);
     return ((octave * 6u + face) * FACE_CELLS + place.y) * FACE_CELLS + place.x;
