@@ -96,7 +96,6 @@ fn ground_under_the_eye_is_closed() {
                 ("at random", false, 0.0, usize::MAX),
                 ("on a grid", true, 0.0, usize::MAX),
                 ("rough", false, 0.05, 500),
-                ("rougher", false, 0.1, 500),
             ] {
                 let cloud = ground(height, grid, noise, 60);
                 let height = |at: DVec2| f64::from(height(at.as_vec2().to_array()));
