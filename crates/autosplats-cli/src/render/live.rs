@@ -87,7 +87,7 @@ pub(super) fn run(
             tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let path = film.file(frame);
-            let report = FrameReport { frame, seconds, path, pictures: None, counts, read_ms, timings_ms };
+            let report = FrameReport { frame, seconds, path, pictures: None, counts, tree: None, read_ms, timings_ms };
             let mut shot = Some(QueuedPicture { image: writer.picture(job, &rendered), report });
             if is_film {
                 std::mem::swap(&mut shot, &mut shown);
