@@ -92,7 +92,8 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
     if sum.weight > 0.0 {
         let per_total = 1.0 / sum.weight;
         sum.offset *= per_total;
-        sum.normal = normalize(sum.normal);
+        // Weights may be so small that their squares are zero.
+        sum.normal = normalize(sum.normal * per_total);
         sum.curvature *= per_total;
     } else {
         sum.weight = select(0.0, -1.0, disagrees);
@@ -174,6 +175,11 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let own_radius = initial_radius_of(cell.count, cell_px, surfel.center.z);
     // A line has no width to draw.
     surfel.major_ratio = select(min(surfel.major_ratio, frame.longest), 1.0, is_line(surfel));
+    if is_near(surfel) {
+        // Cells lack the neighbours of near points.
+        surfels[place] = surfel;
+        return;
+    }
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
     let is_noisy = calls(surfel, noise, enough);
     var surface = Surface();

@@ -137,7 +137,7 @@ impl Task<'_> {
         // The standard error of the first plane is about noise over k-radius.
         let (noise, known) = self.noise(surfel.center.into(), surfel.k_radius, surfel.source);
         let goal = Goal::new(noise, known.is_some(), surfel.k_radius, surfel.center[2], self.view);
-        if surfel.is_dropped() {
+        if surfel.is_dropped() || surfel.is_near() {
             RefitReason::Nothing
         } else if is_row(surfel) && known.is_none() {
             // The depth steps of a depth camera form lines too, but the surface does not run along them.
@@ -168,6 +168,10 @@ fn adapt_all_with<'a, S: Simd>(
         if !matches!(call, RefitReason::Row) {
             // A line has no width to draw.
             surfel.major_ratio = if surfel.is_line() { 1.0 } else { surfel.major_ratio.min(longest) };
+        }
+        if surfel.is_near() {
+            // Cells lack the neighbours of near points.
+            continue;
         }
         match call {
             RefitReason::Nothing => shrink(simd, surfel, sparser, task, gathered),

@@ -163,8 +163,9 @@ pub(crate) fn measure(
         Sampled { surfel, radius, scatter: [None; SCALES] }
     };
     let below = picked_below(surfels.len());
-    // A dropped point has no ball.
-    let is_picked = |surfel: &&Surfel| !surfel.is_dropped() && hash_index(names.of(surfel.source)) < below;
+    // A dropped point has no ball; cells lack the neighbours of near points.
+    let is_picked =
+        |surfel: &&Surfel| !surfel.is_dropped() && !surfel.is_near() && hash_index(names.of(surfel.source)) < below;
     let mut sample: Vec<Sampled> =
         surfels.par_iter().with_min_len(PICK_TASK).filter(is_picked).copied().map(of).collect();
     sample.truncate(MOST_SAMPLED);

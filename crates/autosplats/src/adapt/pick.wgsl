@@ -26,8 +26,11 @@ fn pick(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     let place = group_index(workgroup) * SMALL_GROUP + local;
     let len = counters[ACTIVE];
     let below = (0xffffffffu / max(len, NOISE_SAMPLE_COUNT)) * NOISE_SAMPLE_COUNT;
-    // A dropped point has no ball.
-    if place < len && hash_index(name_of(surfels[place].source)) < below && surfels[place].radius > 0.0 {
+    if place >= len || hash_index(name_of(surfels[place].source)) >= below {
+        return;
+    }
+    // A dropped point has no ball; cells lack the neighbours of near points.
+    if !is_dropped(surfels[place]) && !is_near(surfels[place]) {
         let at = atomicAdd(&picked[MOST_SAMPLED], 1u);
         if at < MOST_SAMPLED {
             atomicStore(&picked[at], place);

@@ -25,6 +25,10 @@ pub(super) const FEW_NEIGHBORS: f32 = 4.0;
 /// K-radius, in first search radii, above which the surroundings of a point with few neighbours are denser.
 pub(super) const FEW_NEIGHBORS_FIRST_RADII: f32 = 1.3;
 
+/// Largest surface variation around a point near the eye. No density tells such points from outliers. Neighbours that
+/// happen to fill space have three times this variation.
+pub(super) const MAX_NEAR_VARIATION: f32 = 0.05;
+
 /// Number of screen points below which there is nothing to compare with, and a cloud is no surface.
 pub(crate) const MIN_SURFACE_POINTS: usize = 64;
 

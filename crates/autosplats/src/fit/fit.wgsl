@@ -128,19 +128,25 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     let center = point.position_view;
     let face = plane(sums, to_eye(center));
     let cell = density[density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns)];
-    let first = initial_radius_of(cell.count, task.cell_px, center.z);
+    var first = initial_radius_of(cell.count, task.cell_px, center.z);
+    let of_near = has_near_flag(point.pixel);
+    if of_near {
+        // No rule about density applies.
+        first = infinity();
+    }
 
+    let fills_space = of_near && !(face.curvature <= MAX_NEAR_VARIATION);
     var radius = 0.0;
-    if sums.count > 0.0 {
-        radius = splat_radius(sums.k_radius, sums.count);
+    if sums.count > 0.0 && !fills_space {
+        radius = select(1.0, NEAR_RADIUS_GROWTH, of_near) * splat_radius(sums.k_radius, sums.count);
     } else if frame.keep_outliers == 1u {
-        radius = ISOLATED_DOT_RADIUS_PX * pixel_size(center.z);
+        radius = ISOLATED_DOT_RADIUS_PX * max(pixel_size(center.z), 0.0);
     }
     let sparser = select(0.0, sums.k_radius / first, frame.compares_density == 1u && task.points >= MIN_SURFACE_POINTS);
-    if frame.keep_outliers == 0u && is_outlier(sums, face, sparser) {
+    if frame.keep_outliers == 0u && (fills_space || is_outlier(sums, face, sparser)) {
         radius = 0.0;
     }
-    if center.z > culling_depth(cell.nearest, task.cell_px) {
+    if !of_near && center.z > culling_depth(cell.nearest, task.cell_px) {
         radius = min(radius, splat_radius(MAX_CULLED_FIRST_RADII * first, f32(frame.k)));
     }
     let screen_and_flags = query | select(0u, LINE, face.is_line);

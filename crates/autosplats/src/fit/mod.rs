@@ -25,6 +25,7 @@ pub(crate) use given::{GivenPlanes, place};
 use glam::Vec3;
 
 use crate::camera::View;
+use crate::project::{ScreenPoint, pixel_xy};
 
 /// Radius to which a splat is drawn, in splat radii; the weight falls to nearly 0 there. With random samples, 1 in 50
 /// places of a surface lies in no disc of the splat radius, 1 in 3000 in no disc of this radius.
@@ -49,7 +50,7 @@ pub(crate) struct Surfel {
     pub(crate) major_ratio: f32,
     /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
     pub(crate) curvature: f32,
-    /// Pixel of the centre: column in the low, row in the high 16 bits.
+    /// Pixel of the centre, with the flags of the point: see [`ScreenPoint::pixel`].
     pub(crate) pixel: u32,
     /// Index in the cloud.
     pub(crate) source: u32,
@@ -92,10 +93,16 @@ impl Surfel {
         self.radius == 0.0
     }
 
+    /// Whether the point is near the eye: see [`ScreenPoints`](crate::project::ScreenPoints).
+    #[inline(always)]
+    pub(crate) fn is_near(&self) -> bool {
+        self.pixel & ScreenPoint::NEAR != 0
+    }
+
     /// Column and row of the centre's pixel.
     #[inline(always)]
     pub(crate) fn pixel_xy(&self) -> [usize; 2] {
-        [(self.pixel & 0xffff) as usize, (self.pixel >> 16) as usize]
+        pixel_xy(self.pixel)
     }
 
     /// Moves the centre, unless it would leave the screen: there is no pixel outside to test its visibility at.
@@ -104,7 +111,7 @@ impl Surfel {
         let [x, y] = view.to_pixel(center);
         if center.z > view.near && x >= 0.0 && y >= 0.0 && x < view.width as f32 && y < view.height as f32 {
             self.center = center.to_array();
-            self.pixel = (y as u32) << 16 | x as u32;
+            self.pixel = self.pixel & ScreenPoint::NEAR | (y as u32) << 16 | x as u32;
         }
     }
 }

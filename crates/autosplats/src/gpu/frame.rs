@@ -49,8 +49,8 @@ pub(crate) struct FrameUniform {
     pub(crate) scan_lines: u32,
     /// 1 if outliers are held against the density around them.
     pub(crate) compares_density: u32,
-    /// Padding to sixteen bytes, which WGSL adds implicitly.
-    pub(crate) padding: u32,
+    /// 1 if points near the eye are listed.
+    pub(crate) near_cells: u32,
 }
 
 impl FrameUniform {
@@ -84,7 +84,7 @@ impl FrameUniform {
             dot_px: 0.0,
             scan_lines: 0,
             compares_density: 0,
-            padding: 0,
+            near_cells: 0,
         }
     }
 

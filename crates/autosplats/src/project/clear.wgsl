@@ -1,6 +1,6 @@
-// Empties keys, density cells, counters and sixteenths for a new frame.
+// Empties keys, density cells, counters, sixteenths and the cells around the eye for a new frame.
 //
-// Writes: keys, density, counters, sixteenths.
+// Writes: keys, density, counters, sixteenths, near.
 
 #import frame
 #import density
@@ -11,6 +11,7 @@
 @group(0) @binding(2) var<storage, read_write> density: array<DensityCell>;
 @group(0) @binding(3) var<storage, read_write> counters: array<u32>;
 @group(0) @binding(4) var<storage, read_write> sixteenths: array<u32>;
+@group(0) @binding(5) var<storage, read_write> near: array<u32>;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn clear(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -26,5 +27,8 @@ fn clear(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     if index < arrayLength(&sixteenths) {
         sixteenths[index] = 0u;
+    }
+    if index < NEAR_CELLS {
+        near[index] = 0u;
     }
 }

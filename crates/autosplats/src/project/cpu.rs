@@ -7,6 +7,7 @@ use glam::Vec3;
 use rayon::iter::Either;
 use rayon::prelude::*;
 
+use super::near::{NearCells, cell, clamped_pixel, first_octave};
 use super::sixteenths::{Sixteenths, half, sixteenth, sixteenths_at};
 use super::{Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints, SlotTable};
 use crate::camera::View;
@@ -34,6 +35,7 @@ pub(super) const OCCUPANCY_BLOCK_PX: usize = 16;
 pub(crate) struct Projector {
     /// Per pixel or half pixel, `depth bits << 32 | point index`. The bits of positive floats order like the floats.
     keys: Vec<AtomicU64>,
+    near: NearCells,
     screen: ScreenPoints,
 }
 
@@ -51,13 +53,17 @@ impl Projector {
         rules: &ProjectRules,
         cancel: &Cancel<'_>,
     ) -> &ScreenPoints {
-        let ProjectRules { k, halves, .. } = *rules;
-        let Self { keys, screen } = self;
+        let ProjectRules { k, halves, near: lists_near, .. } = *rules;
+        let Self { keys, near, screen } = self;
         let points = SlotTable::new(points.into(), view);
-        screen.dropped = nearest_per_pixel(&points, view, halves, keys, &mut screen.sixteenths, cancel);
+        near.clear(view);
+        let found = (lists_near && view.perspective).then_some(&*near);
+        screen.dropped = nearest_per_pixel(&points, view, halves, keys, &mut screen.sixteenths, found, cancel);
         let keys = Keys::settle(keys, view, halves);
         let spacing_px = keys.mean_spacing();
         compact(&points, view, &keys, spacing_px, screen);
+        near.list(&points, view, k as usize + 1);
+        append_near(&points, view, near, screen);
         screen.names = points.names;
         measure_density(screen, view, spacing_px, k);
         split(rules, view, screen);
@@ -136,6 +142,7 @@ fn nearest_per_pixel(
     halves: bool,
     keys: &mut Vec<AtomicU64>,
     sixteenths: &mut Sixteenths,
+    near: Option<&NearCells>,
     cancel: &Cancel<'_>,
 ) -> Dropped {
     let pixels = view.width as usize * view.height as usize;
@@ -149,7 +156,10 @@ fn nearest_per_pixel(
         if cancel.is_given_up() {
             return;
         }
-        let dropped = project_chunk(positions, first, &view, halves, keys, sixteenths);
+        let dropped = match near {
+            Some(near) => project_chunk::<true>(positions, first, &view, halves, keys, sixteenths, near),
+            None => project_chunk::<false>(positions, first, &view, halves, keys, sixteenths, &NearCells::default()),
+        };
         not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);
         behind.fetch_add(dropped.behind, Ordering::Relaxed);
         outside.fetch_add(dropped.outside, Ordering::Relaxed);
@@ -163,27 +173,31 @@ const NOT_FINITE: u32 = u32::MAX;
 const BEHIND: u32 = u32::MAX - 1;
 const OUTSIDE: u32 = u32::MAX - 2;
 
-/// Projects up to [`TASK_POINTS`] points. Compiled for the baseline processor: wider vectors make projection slower.
-fn project_chunk(
+/// Projects up to [`TASK_POINTS`] points, and counts them in the cells around the eye if `NEAR`. Compiled for the
+/// baseline processor: wider vectors make projection slower.
+fn project_chunk<const NEAR: bool>(
     positions: &[[f32; 3]],
     first: u32,
     view: &View,
     halves: bool,
     keys: &[AtomicU64],
     sixteenths: &Sixteenths,
+    near: &NearCells,
 ) -> Dropped {
     let mut dropped = Dropped::default();
     let mut slot = [0u32; LANES];
     let mut depth = [0f32; LANES];
     let mut part = [0u32; LANES];
+    let mut around = [0u32; LANES];
     for (group, positions) in positions.chunks(LANES).enumerate() {
         if let Ok(positions) = <&[[f32; 3]; LANES]>::try_from(positions) {
             for lane in 0..LANES {
-                (slot[lane], depth[lane], part[lane]) = project_point(positions[lane], view, halves);
+                (slot[lane], depth[lane], part[lane], around[lane]) =
+                    project_point::<NEAR>(positions[lane], view, halves);
             }
         } else {
             for (lane, &position) in positions.iter().enumerate() {
-                (slot[lane], depth[lane], part[lane]) = project_point(position, view, halves);
+                (slot[lane], depth[lane], part[lane], around[lane]) = project_point::<NEAR>(position, view, halves);
             }
         }
         // Load all lanes first: plain loads wait for memory together, while atomic writes keep later loads waiting.
@@ -196,6 +210,9 @@ fn project_chunk(
             }
         }
         for lane in 0..positions.len() {
+            if NEAR && slot[lane] != NOT_FINITE {
+                near.add(around[lane], first + (group * LANES + lane) as u32);
+            }
             match slot[lane] {
                 NOT_FINITE => dropped.not_finite += 1,
                 BEHIND => dropped.behind += 1,
@@ -218,9 +235,9 @@ fn project_chunk(
     dropped
 }
 
-/// Slot and depth of a point, and its sixteenth within the pixel, without branches.
+/// Slot and depth of a point, its sixteenth within the pixel and, if `NEAR`, its cell around the eye, without branches.
 #[inline(always)]
-fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u32) {
+fn project_point<const NEAR: bool>(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u32, u32) {
     let [x, y, z] = view.to_view(position).to_array();
     let [px, py] = view.to_pixel(Vec3::new(x, y, z));
     // Inside the image coordinates are positive, so truncation rounds down.
@@ -234,7 +251,8 @@ fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u3
     // Finite coordinates count as not finite too if their transform overflows.
     #[allow(clippy::eq_op, reason = "three subtractions vectorise, is_finite does not")]
     let finite = (x - x == 0.0) & (y - y == 0.0) & (z - z == 0.0);
-    (if finite { slot } else { NOT_FINITE }, z, sixteenth([x4, y4]))
+    let around = if NEAR { cell([x, y, z], first_octave(view.near)) } else { 0 };
+    (if finite { slot } else { NOT_FINITE }, z, sixteenth([x4, y4]), around)
 }
 
 fn is_owned(key: &AtomicU64) -> bool {
@@ -325,6 +343,25 @@ fn compact(cloud: &SlotTable<'_>, view: &View, keys: &Keys, spacing_px: f32, scr
             point.position_view = cloud.to_view(index, view).to_array();
         }
     });
+}
+
+/// Appends the points of sparse cells. Near points among the screen points become silent, as do those appended that are
+/// not near.
+fn append_near(cloud: &SlotTable<'_>, view: &View, near: &NearCells, screen: &mut ScreenPoints) {
+    let ScreenPoints { points, source, near_first, .. } = screen;
+    *near_first = points.len();
+    if near.listed.is_empty() {
+        return;
+    }
+    points.par_iter_mut().filter(|point| near.is_near(point.position_view)).for_each(|point| {
+        point.pixel |= ScreenPoint::SILENT;
+    });
+    source.extend(&near.listed);
+    points.extend(near.listed.iter().map(|&index| {
+        let position_view = cloud.to_view(index, view).to_array();
+        let silent = if near.is_near(position_view) { 0 } else { ScreenPoint::SILENT };
+        ScreenPoint { position_view, pixel: clamped_pixel(position_view, view) | ScreenPoint::NEAR | silent }
+    }));
 }
 
 /// Counts the screen points and finds the nearest depth of each cell of about `k` points.

@@ -2,18 +2,31 @@
 
 pub(crate) use super::Round;
 use super::device_cloud::{Chunk, DeviceCloud};
-use super::{MARGIN_REACH, ScreenPoint, cpu};
+use super::{MARGIN_REACH, ScreenPoint, cpu, near};
 use crate::Error;
 use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, INT64_ATOMICS, Library, Pass, Step, constants, files, indices, passes};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
-    files: &[files!["active", "add_sixteenth", "cell_order", "count_dropped", "keys"]],
+    files: &[files![
+        "active",
+        "add_sixteenth",
+        "cell_order",
+        "count_dropped",
+        "count_near",
+        "keys",
+        "near_cells",
+        "near_points"
+    ]],
     constants: &[
         Counter::CONSTANTS,
         Work::CONSTANTS,
         constants!(in cpu: MAX_SECOND_DEPTH_PX, OCCUPANCY_BLOCK_PX, STRIP_SPACINGS),
-        constants![MARGIN_REACH, RANK_BLOCK_FLAGS],
+        constants!(in near:
+            FACE_CELLS, FIRST_OCTAVE, LISTED_OCTAVES, MOST_NEAR, NEAR_CELLS, NEAR_POINTS, NEAR_REACH, OCTAVES,
+            SPARSE_POINTS
+        ),
+        constants![ENTRY_WORDS, MARGIN_REACH, RANK_BLOCK_FLAGS],
     ],
 };
 
@@ -27,6 +40,7 @@ passes! {
     COUNT = "count",
     SCAN = "scan",
     COMPACT = "compact",
+    LIST_NEAR = "list_near",
     GATHER = "gather",
     SPLIT_COUNT = "split_count",
     SPLIT = "split",
@@ -86,6 +100,8 @@ pub(crate) fn few(gpu: &Gpu) -> u32 {
     if gpu.is_software() { 16 } else { 4 }
 }
 
+/// Words of an entry of a cell around the eye: index and position of a point.
+const ENTRY_WORDS: usize = 4;
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = crate::gpu::LARGE_GROUP;
 /// Flags that one workgroup ranks: a block.
@@ -98,8 +114,14 @@ indices! {
         NotFinite,
         Behind,
         Outside,
-        /// Screen points.
+        /// Screen points, with those of sparse cells around the eye.
         Visible,
+        /// Screen points without those.
+        NearFirst,
+        /// Octave of the nearest crowded cell around the eye.
+        CrowdedOctave,
+        /// Points that serve as neighbours only, because they are near or listed without being near.
+        SilentPoints,
         /// Blocks of the screen that hold screen points.
         Blocks,
         /// Height of a strip of cells in pixels.
@@ -152,6 +174,8 @@ pub(crate) struct ScreenBuffers {
     /// One `u32` per [`Counter`].
     pub(crate) counters: wgpu::Buffer,
     keys: wgpu::Buffer,
+    /// Number of points of each cell around the eye, then entries for each.
+    near: wgpu::Buffer,
     /// [`DensityCell`]s.
     pub(crate) density: wgpu::Buffer,
     /// Index of the first screen point of each cell.
@@ -178,7 +202,7 @@ pub(crate) struct ScreenBuffers {
 impl ScreenBuffers {
     /// Whether the device can bind the keys of all slots of a screen, and a `T` for each possible screen point.
     pub(crate) fn has_room<T>(gpu: &Gpu, size: [u32; 2], halves: bool, points: usize) -> bool {
-        gpu.binds::<[u32; 2]>(capacity(size, halves, usize::MAX)) && gpu.binds::<T>(capacity(size, halves, points))
+        gpu.binds::<[u32; 2]>(slots(size, halves)) && gpu.binds::<T>(capacity(size, halves, points))
     }
 
     /// Allocates buffers for a screen of `size` and a cloud of `points` points with `values` words each.
@@ -188,7 +212,7 @@ impl ScreenBuffers {
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2], halves: bool, points: usize, values: usize) -> Result<Self, Error> {
         let [width, height] = size.map(|side| side as usize);
         let pixels = width * height;
-        let slots = pixels << u32::from(halves);
+        let slots = slots(size, halves);
         let capacity = capacity(size, halves, points);
         Ok(Self {
             size,
@@ -196,6 +220,10 @@ impl ScreenBuffers {
             capacity: capacity as u32,
             counters: gpu.storage::<u32>("counters", COUNTERS)?,
             keys: gpu.storage::<[u32; 2]>("keys of pixels", slots)?,
+            near: gpu.storage::<u32>(
+                "cells around the eye",
+                near::NEAR_CELLS * (1 + ENTRY_WORDS * near::SPARSE_POINTS as usize),
+            )?,
             // Cells are two pixels wide at least.
             density: gpu.storage::<DensityCell>("density grid", width.div_ceil(2) * height.div_ceil(2))?,
             cell_start: gpu.storage::<u32>("starts of cells", pixels + 1)?,
@@ -207,7 +235,8 @@ impl ScreenBuffers {
             queries: gpu.storage::<u32>("queries", capacity)?,
             passive: gpu.storage::<u32>("passive points", capacity)?,
             left: gpu.storage::<u32>("queries left", capacity)?,
-            block_sums: gpu.storage::<u32>("sums of blocks", slots.div_ceil(RANK_BLOCK_FLAGS as usize))?,
+            block_sums: gpu
+                .storage::<u32>("sums of blocks", slots.max(capacity).div_ceil(RANK_BLOCK_FLAGS as usize))?,
             arguments: gpu.buffer(
                 "arguments",
                 Work::CONSTANTS.len() as u64 * DISPATCH_BYTES,
@@ -222,9 +251,14 @@ impl ScreenBuffers {
     }
 }
 
-/// Largest possible number of screen points on a screen of this size.
-fn capacity([width, height]: [u32; 2], halves: bool, points: usize) -> usize {
-    points.min((width as usize * height as usize) << u32::from(halves))
+/// Number of places for points on a screen of this size.
+fn slots([width, height]: [u32; 2], halves: bool) -> usize {
+    (width as usize * height as usize) << u32::from(halves)
+}
+
+/// Largest possible number of screen points on a screen of this size, with those of sparse cells around the eye.
+fn capacity(size: [u32; 2], halves: bool, points: usize) -> usize {
+    points.min(slots(size, halves)) + points.min(near::MOST_NEAR)
 }
 
 /// Computes the number of workgroups of each [`Work`].
@@ -279,8 +313,8 @@ impl NearestPass {
     fn steps(&self, gpu: &Gpu, frame: &wgpu::Buffer, cloud: &DeviceCloud, screen: &ScreenBuffers) -> Vec<Step> {
         let run = |pass: &Pass, turn: Option<&wgpu::Buffer>| -> Vec<Step> {
             let step = |chunk: &Chunk| {
-                let ScreenBuffers { keys, counters, sixteenths, .. } = screen;
-                let buffers = [frame, &chunk.uniform, &chunk.positions, keys, counters, sixteenths];
+                let ScreenBuffers { keys, counters, sixteenths, near, .. } = screen;
+                let buffers = [frame, &chunk.uniform, &chunk.positions, keys, counters, sixteenths, near];
                 let buffers: Vec<_> = buffers.into_iter().chain(turn).collect();
                 pass.step(gpu, &buffers, chunk.capacity.div_ceil(GROUP))
             };
@@ -303,6 +337,7 @@ pub(crate) struct ProjectPasses {
     count: Pass,
     scan_visible: Pass,
     compact: Pass,
+    list_near: Pass,
     gather: Pass,
     split_count: Pass,
     scan_active: Pass,
@@ -325,6 +360,7 @@ impl ProjectPasses {
             count: pass(&COUNT)?,
             scan_visible: scan_pass(gpu, Counter::Visible, None)?,
             compact: pass(&COMPACT)?,
+            list_near: pass(&LIST_NEAR)?,
             gather: pass(&GATHER)?,
             split_count: pass(&SPLIT_COUNT)?,
             scan_active: scan_pass(gpu, Counter::Active, Some(Counter::Visible))?,
@@ -341,26 +377,30 @@ impl ProjectPasses {
         cloud: &DeviceCloud,
         screen: &ScreenBuffers,
     ) -> Vec<Step> {
-        let ScreenBuffers { counters, keys, density, cell_start, sixteenths, .. } = screen;
+        let ScreenBuffers { counters, keys, near, density, cell_start, sixteenths, .. } = screen;
         let ScreenBuffers { source, pixels, points, values, block_sums, .. } = screen;
         let [width, height] = screen.size;
         let slots = (width * height) << u32::from(screen.halves);
         let slot_blocks = slots.div_ceil(RANK_BLOCK_FLAGS);
+        let cleared = slots.max(near::NEAR_CELLS as u32);
         let mut steps =
-            vec![self.clear.step(gpu, &[frame, keys, density, counters, sixteenths], slots.div_ceil(GROUP))];
+            vec![self.clear.step(gpu, &[frame, keys, density, counters, sixteenths, near], cleared.div_ceil(GROUP))];
         steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
         const BLOCK_PX: u32 = cpu::OCCUPANCY_BLOCK_PX as u32;
         let covered_blocks = width.div_ceil(BLOCK_PX) * height.div_ceil(BLOCK_PX);
         steps.push(self.occupancy.step(gpu, &[frame, keys, counters], covered_blocks));
         steps.push(self.grid.step(gpu, &[frame, counters], 1));
-        steps.push(self.count.step(gpu, &[frame, keys, counters, block_sums, density], slot_blocks));
+        // Blocks beyond the slots, which only hold points of sparse cells, count none.
+        let blocks = slots.max(screen.capacity).div_ceil(RANK_BLOCK_FLAGS);
+        steps.push(self.count.step(gpu, &[frame, keys, counters, block_sums, density], blocks));
         steps.push(self.scan_visible.step(gpu, &[frame, block_sums, counters], 1));
         let compact = [frame, keys, counters, block_sums, source, pixels, cell_start];
         steps.push(self.compact.step(gpu, &compact, slot_blocks));
+        steps.push(self.list_near.step(gpu, &[frame, near, counters, source], 1));
         steps.push(self.work.step(gpu, frame, screen));
         for chunk in cloud.chunks() {
-            let gather =
-                [frame, &chunk.uniform, &chunk.positions, &chunk.values, counters, source, pixels, points, values];
+            let Chunk { uniform, positions, values: stored, .. } = chunk;
+            let gather = [frame, uniform, positions, stored, counters, source, pixels, points, values, near];
             steps.push(self.gather.step(gpu, &gather, screen.groups(Work::Visible256)));
         }
         steps.push(self.split_count.step(

@@ -14,7 +14,8 @@
 //! A coarser grid, with about k screen points to a cell, counts points for the first search radius (§5.1). The grid
 //! also holds the nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
 //!
-//! The points come in runs, each about an origin of its own (`slots`); all that leaves the stage is in view space.
+//! The points come in runs, each about an origin of its own (`slots`); all that leaves the stage is in view space. Points
+//! of surfaces that the eye almost touches are listed once more, also beside the screen (`near`).
 //!
 //! Every point on the screen marks the sixteenth of its pixel that it falls into, with one bit that points there share.
 //! The splatting finds the borders of surfaces from these bits.
@@ -22,6 +23,7 @@
 mod cpu;
 mod device_cloud;
 pub(crate) mod gpu;
+mod near;
 mod sixteenths;
 mod slots;
 #[cfg(test)]
@@ -62,13 +64,15 @@ pub(crate) struct ProjectRules {
     pub(crate) halves: bool,
     /// Whether points well behind the nearest of their cell become passive.
     pub(crate) grid_culling: bool,
+    /// Whether points near the eye are listed (`near`); in parallel projection there is no eye to be near to.
+    pub(crate) near: bool,
 }
 
 #[cfg(test)]
 impl ProjectRules {
     /// Default rules.
     pub(crate) fn usual(k: u32) -> Self {
-        Self { k, halves: true, grid_culling: true }
+        Self { k, halves: true, grid_culling: true, near: false }
     }
 }
 
@@ -78,25 +82,50 @@ impl ProjectRules {
 pub(crate) struct ScreenPoint {
     /// Position in view space (x right, y down, z forward), world units.
     pub(crate) position_view: [f32; 3],
-    /// Pixel column in the low, row in the high 16 bits.
+    /// Pixel column in the low, row in the high 16 bits, and two flags: [`NEAR`](Self::NEAR) and
+    /// [`SILENT`](Self::SILENT). No screen is wider than 32767 pixels.
     pub(crate) pixel: u32,
 }
 
 impl ScreenPoint {
-    /// Column and row of the pixel.
+    /// Flag: the point is in the list of [`ScreenPoints::near_first`].
+    pub(crate) const NEAR: u32 = 1 << 15;
+    /// Flag: the point serves as a neighbour only.
+    pub(crate) const SILENT: u32 = 1 << 31;
+
+    /// Column and row of the pixel; of a near point beside the screen, the one at the edge in its direction.
     #[inline(always)]
     pub(crate) fn pixel_xy(&self) -> [usize; 2] {
-        [(self.pixel & 0xffff) as usize, (self.pixel >> 16) as usize]
+        pixel_xy(self.pixel)
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_near(&self) -> bool {
+        self.pixel & Self::NEAR != 0
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_silent(&self) -> bool {
+        self.pixel & Self::SILENT != 0
     }
 }
 
-/// The screen points of one frame in cell order.
+/// Column and row of a pixel with flags.
+#[inline(always)]
+pub(crate) fn pixel_xy(pixel: u32) -> [usize; 2] {
+    [(pixel & 0x7fff) as usize, (pixel >> 16 & 0x7fff) as usize]
+}
+
+/// The screen points of one frame in cell order, then the points of sparse cells around the eye.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ScreenPoints {
     pub(crate) points: Vec<ScreenPoint>,
     /// Index in the cloud of each screen point.
     pub(crate) source: Vec<u32>,
     pub(crate) names: PointNames,
+    /// Index of the first point of the sparse cells (`near`), among which near points have their neighbours. The number
+    /// of points if there are none.
+    pub(crate) near_first: usize,
     pub(crate) cells: ScreenCells,
     pub(crate) density: DensityGrid,
     /// Indices of the screen points to reconstruct first, ascending.
@@ -159,20 +188,27 @@ impl DensityGrid {
     /// Whether a point lies behind the culling plane of its cell.
     #[inline(always)]
     pub(crate) fn culls(&self, point: &ScreenPoint) -> bool {
-        point.position_view[2] > self.culling[self.cell(point.pixel_xy())]
+        !point.is_near() & (point.position_view[2] > self.culling[self.cell(point.pixel_xy())])
     }
 
-    /// Whether a point's splat can matter: the point lies at most `MARGIN_REACH` first search radii beside the picture.
+    /// Whether a point's splat can matter: the point is near and not silent, or lies at most `MARGIN_REACH` first
+    /// search radii beside the picture.
     #[inline(always)]
     pub(crate) fn matters(&self, point: &ScreenPoint, k: u32, view: &View) -> bool {
+        if point.is_near() | point.is_silent() {
+            return !point.is_silent();
+        }
         let beside_px = view.beside_picture(point.pixel_xy());
         beside_px == 0 || beside_px as f32 <= MARGIN_REACH * self.initial_radius_px(point, k)
     }
 
     /// First search radius of a point in world units: the radius of a circle that holds k points at the density of the
-    /// point's cell [Paper, §5.1].
+    /// point's cell [Paper, §5.1]. Infinite for a near point, to which no rule about density applies.
     #[inline(always)]
     pub(crate) fn initial_radius(&self, point: &ScreenPoint, k: u32, view: &View) -> f32 {
+        if point.is_near() {
+            return f32::INFINITY;
+        }
         self.initial_radius_px(point, k) * view.pixel_size(point.position_view[2])
     }
 

@@ -1,11 +1,12 @@
 // Every point goes to its pixel, or half pixel, and the nearest wins [Paper, §3], by a 64-bit atomic minimum.
 //
-// Reads: a chunk of the cloud. Writes: keys, counters, sixteenths. `project_32` does the same with 32 bits.
+// Reads: a chunk of the cloud. Writes: keys, counters, sixteenths, near. `project_32` does the same with 32 bits.
 
 #import frame
 #import add_sixteenth
 #import cloud_points
 #import count_dropped
+#import count_near
 #import groups
 #import project_point
 
@@ -14,6 +15,7 @@
 @group(0) @binding(3) var<storage, read_write> keys: array<atomic<u64>>;
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> sixteenths: array<atomic<u32>>;
+@group(0) @binding(6) var<storage, read_write> near: array<atomic<u32>>;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -21,6 +23,7 @@ fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     let index = group_index(workgroup) * LARGE_GROUP + local;
     if is_drawn(index) {
         let projected = project_point(from_eye(index));
+        count_near(projected, chunk.first + index);
         if projected.slot >= SLOT_OUTSIDE {
             count_dropped(projected.slot);
         } else {

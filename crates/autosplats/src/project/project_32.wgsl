@@ -2,12 +2,13 @@
 // the lowest index among the points at that depth. Both turns share one program, because two programs need not compute
 // the same bits: a depth that differed between them would leave a hole.
 //
-// Reads: a chunk of the cloud, turn. Writes: keys, counters, sixteenths.
+// Reads: a chunk of the cloud, turn. Writes: keys, counters, sixteenths, near.
 
 #import frame
 #import add_sixteenth
 #import cloud_points
 #import count_dropped
+#import count_near
 #import groups
 #import project_point
 
@@ -16,8 +17,9 @@
 @group(0) @binding(3) var<storage, read_write> keys: array<AtomicKey>;
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> sixteenths: array<atomic<u32>>;
+@group(0) @binding(6) var<storage, read_write> near: array<atomic<u32>>;
 // 0 for depths, 1 for indices.
-@group(0) @binding(6) var<uniform> turn: u32;
+@group(0) @binding(7) var<uniform> turn: u32;
 
 // As in `keys`, with atomics.
 struct AtomicKey {
@@ -32,6 +34,9 @@ fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     if is_drawn(index) {
         let projected = project_point(from_eye(index));
         let depth = bitcast<u32>(projected.depth);
+        if turn == 0u {
+            count_near(projected, chunk.first + index);
+        }
         if projected.slot >= SLOT_OUTSIDE {
             if turn == 0u {
                 count_dropped(projected.slot);

@@ -130,7 +130,8 @@ fn settled(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Positions
 /// Checks owners, drops, sixteenths, order, starts of cells, density grid and the split by depth.
 fn compare(screen: &ScreenPoints, oracle: &Oracle, camera: &Camera, size: [u32; 2]) -> Result<(), String> {
     let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(what.to_owned()) };
-    let ScreenPoints { points, source, cells, density, active, passive, sixteenths, dropped, .. } = screen;
+    let ScreenPoints { points, source, near_first, cells, density, active, passive, sixteenths, dropped, .. } = screen;
+    ensure(*near_first == points.len(), "points are listed without being asked for")?;
     ensure(*dropped == oracle.dropped, &format!("dropped {dropped:?}, not {:?}", oracle.dropped))?;
     for (pixel, [x, y]) in (0..size[1] as usize).flat_map(|y| (0..size[0] as usize).map(move |x| [x, y])).enumerate() {
         let expected = oracle.sixteenths.get(&[x, y]).copied().unwrap_or(0);
@@ -383,7 +384,7 @@ fn a_margin_adds_neighbours_and_few_queries() {
     let [camera, _] = cameras();
     let camera = Camera { projection: Projection::PerspectiveFovDeg(10.0), ..camera };
     for grid_culling in [true, false] {
-        let rules = ProjectRules { k: 10, halves: true, grid_culling };
+        let rules = ProjectRules { grid_culling, ..ProjectRules::usual(10) };
         let picture = camera.view(DVec3::ZERO, SIZE).expect("a view");
         let alone = Projector::default().project(&cloud, &picture, &rules, &crate::cancel::NEVER).clone();
         let view = picture.with_margin(MARGIN as u32);
@@ -423,4 +424,49 @@ fn density_cells_hold_about_k_points() {
         // Cells have a whole number of pixels.
         assert!((0.6..1.6).contains(&(mean / k as f32)), "k = {k}: {mean} points to a cell");
     }
+}
+
+/// Ground with a point per square unit, seen by a walker: near points are those of brute force over the cells, and are
+/// listed wherever they lie.
+#[test]
+fn near_points_are_listed_all_around() {
+    let mut random = Random::new(91);
+    let eye = DVec3::new(0.3, -0.2, 1.7);
+    let mut positions: Positions =
+        (0..40_000).map(|_| [100.0 * random.signed(), 100.0 * random.signed(), 0.0]).collect();
+    // A crowd, one point of which lies alone in a cell: it is not near.
+    positions.extend((0..500).map(|_| [3.0 + 0.01 * random.unit(), 0.01 * random.unit(), 1.0]));
+    let projection = Projection::PerspectiveFovDeg(60.0);
+    let camera = Camera { eye, look_at: eye + DVec3::new(10.0, 3.0, -1.0), up: DVec3::Z, projection };
+    let view = camera.view(DVec3::ZERO, [160, 120]).expect("a view").with_margin(10);
+    let rules = ProjectRules { near: true, ..ProjectRules::usual(10) };
+    let mut projector = Projector::default();
+    let screen = projector.project(&cloud(&positions), &view, &rules, &crate::cancel::NEVER);
+    let listed = &screen.points[screen.near_first..];
+    let is_spoken_for = |source: u32| {
+        let all =
+            screen.points.iter().zip(&screen.source).filter(|&(point, other)| *other == source && point.is_near());
+        all.filter(|(point, _)| !point.is_silent()).count()
+    };
+    for (source, position) in (0..).zip(&positions) {
+        let distance = DVec3::from(position.map(f64::from)).distance(eye);
+        let crowded = source >= 40_000;
+        // All around, ahead and behind. Cells differ in size, so that distances in between are undecided.
+        if !crowded && distance < 2.5 && DVec3::from(position.map(f64::from)).distance(DVec3::new(3.0, 0.0, 1.0)) > 1.5
+        {
+            assert_eq!(is_spoken_for(source), 1, "point {source} at {position:?} is near");
+        }
+        if crowded || distance > 30.0 {
+            assert_eq!(is_spoken_for(source), 0, "point {source} at {position:?} is not near");
+        }
+    }
+    let behind = listed.iter().filter(|point| point.position_view[2] < 0.0 && !point.is_silent()).count();
+    assert!(behind > 10, "{behind} near points are behind the eye");
+    let silent: Vec<u32> = (0..).zip(&screen.points).filter(|(_, point)| point.is_silent()).map(|(at, _)| at).collect();
+    assert!(silent.iter().all(|at| screen.passive.binary_search(at).is_ok()), "silent points ask for nothing");
+    for (point, source) in screen.points[..screen.near_first].iter().zip(&screen.source) {
+        assert_eq!(point.is_silent(), is_spoken_for(*source) == 1, "point {source} is drawn once");
+    }
+    let alone = projector.project(&cloud(&positions), &view, &ProjectRules::usual(10), &crate::cancel::NEVER);
+    assert_eq!(alone.near_first, alone.points.len(), "nothing is listed without being asked for");
 }

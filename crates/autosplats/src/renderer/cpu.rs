@@ -330,15 +330,16 @@ impl CpuFrame<'_> {
         }
         let screen = renderer.projector.screen();
         let dropped = screen.dropped;
+        let passive = screen.passive.iter().filter(|&&index| !screen.points[index as usize].is_silent()).count();
         Counts {
             points: points.len(),
             dropped: dropped.not_finite + dropped.behind + dropped.outside,
             not_finite: dropped.not_finite,
             behind: dropped.behind,
             outside: dropped.outside,
-            visible: screen.points.len(),
-            active: screen.active.len(),
-            passive: screen.passive.len(),
+            visible: screen.near_first,
+            active: screen.near_first - passive,
+            passive,
             recovered: renderer.recovered.len(),
             outliers: renderer.surfels.iter().filter(|surfel| surfel.is_dropped()).count(),
             clamped: search_counts.clamped,

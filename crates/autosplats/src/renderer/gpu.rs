@@ -394,15 +394,17 @@ impl GpuRenderer {
 fn counts(points: Points<'_>, counters: &[u32]) -> Counts {
     let count = |counter: Counter| counters[counter as usize] as usize;
     let [not_finite, behind, outside] = [Counter::NotFinite, Counter::Behind, Counter::Outside].map(count);
+    let visible = count(Counter::NearFirst);
+    let passive = count(Counter::Passive) - count(Counter::SilentPoints);
     Counts {
         points: points.len(),
         dropped: not_finite + behind + outside,
         not_finite,
         behind,
         outside,
-        visible: count(Counter::Visible),
-        active: count(Counter::Active),
-        passive: count(Counter::Passive),
+        visible,
+        active: visible - passive,
+        passive,
         recovered: count(Counter::Recovered),
         outliers: count(Counter::Outliers),
         clamped: count(Counter::Clamped),

@@ -1,7 +1,7 @@
 //! What a frame does with its points: the settings, resolved once for a cloud, a size and a device.
 //!
 //! # What adapting changes
-//! [`Mode::Adaptive`] differs from [`Mode::Paper`] in nine ways. No stage asks for the mode; each gets its rule.
+//! [`Mode::Adaptive`] differs from [`Mode::Paper`] in ten ways. No stage asks for the mode; each gets its rule.
 //!
 //! 1. `search`: a point with k neighbours may exceed the outlier radius a little ([`SearchRules::lenient`]).
 //! 2. `search`: a gap after a single neighbour has to be wider ([`SearchRules::lenient`]).
@@ -11,7 +11,8 @@
 //! 6. `adapt`: sparse points that lie on no surface become dots or are dropped ([`Rules::adapt`]).
 //! 7. `splat`: where noise blurs a border, the density of points trims it (by the noise that `adapt` measures).
 //! 8. A margin around the picture holds points that serve as neighbours ([`Rules::margin_px`]).
-//! 9. A cloud too small for a surface is drawn as dots ([`Mode::Dots`]).
+//! 9. `project`: points near the eye find their neighbours in space ([`ProjectRules::near`]).
+//! 10. A cloud too small for a surface is drawn as dots ([`Mode::Dots`]).
 
 use super::Reconstruction;
 use crate::adapt::AdaptRules;
@@ -146,7 +147,7 @@ impl Rules {
         let averaged = [of_same, settings.frames_averaged];
         Self {
             margin_px,
-            project: ProjectRules { k, halves, grid_culling: settings.grid_culling },
+            project: ProjectRules { k, halves, grid_culling: settings.grid_culling, near: is_exact && is_adaptive },
             search: (mode != Mode::Given).then_some(SearchRules {
                 k,
                 outlier_expansions,
@@ -201,9 +202,10 @@ mod tests {
         let settings = Reconstruction { steady: true, ..Reconstruction::default() };
         let rules = |mode| Rules::new(&settings, mode, [100, 100], |_, _| true);
         let [paper, adaptive, dots, given] = [Mode::Paper, Mode::Adaptive, Mode::Dots(3.0), Mode::Given].map(rules);
-        assert!(adaptive.adapt.is_some() && adaptive.margin_px > 0 && adaptive.fit.scan_lines);
+        assert!(adaptive.adapt.is_some() && adaptive.margin_px > 0 && adaptive.project.near && adaptive.fit.scan_lines);
         for other in [paper, dots, given] {
-            assert!(other.adapt.is_none() && other.margin_px == 0 && !other.fit.scan_lines, "{other:?}");
+            assert!(other.adapt.is_none() && other.margin_px == 0 && !other.project.near, "{other:?}");
+            assert!(!other.fit.scan_lines, "{other:?}");
         }
         let is_averaged = [paper, adaptive, dots, given].map(|rules| rules.averaged.is_some());
         assert_eq!(is_averaged, [true, true, false, false], "averaged");

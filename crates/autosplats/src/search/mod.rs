@@ -4,7 +4,9 @@
 //! splat communication follow these rules. The kd-tree, the paper's baseline, answers another question. Its neighbours
 //! are all points of the cloud, visible or not; it has no gap rule, and its bound is its own.
 //!
-//! For a point P let r̃₀ be the first search radius (§5.1) and d₁ ≤ d₂ ≤ … the distances to the other screen points:
+//! A near point (`project/near.rs`) has its neighbours among the points of sparse cells around the eye; no rule ends
+//! its neighbourhood. For any other point P let r̃₀ be the first search radius (§5.1) and d₁ ≤ d₂ ≤ … the distances to
+//! the other screen points:
 //!
 //! - *Outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions without a neighbour.
 //!   With lenient rules P is discarded if d₁ is more than [`OUTLIER_RADIUS_SLACK`] times that radius, or if d₁ exceeds

@@ -48,6 +48,8 @@ struct Frame {
     scan_lines: u32,
     // 1 if outliers are held against the density around them.
     compares_density: u32,
+    // 1 if points near the eye are listed.
+    near_cells: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -1,5 +1,7 @@
 // Surfels: the results of the fit.
 
+#import screen
+
 // An oriented disc in view space.
 struct Surfel {
     // The point, or the surface position that was fitted to noisy points.
@@ -15,7 +17,7 @@ struct Surfel {
     major_ratio: f32,
     // Surface variation, 0 to 1/3.
     curvature: f32,
-    // Pixel column in the low, row in the high 16 bits.
+    // Pixel column in the low, row in the high 16 bits, and the flag NEAR.
     pixel: u32,
     // Index in the cloud.
     source: u32,
@@ -34,6 +36,11 @@ fn shows_back(surfel: Surfel) -> bool {
 
 fn is_line(surfel: Surfel) -> bool {
     return (surfel.screen_and_flags & LINE) != 0u;
+}
+
+// Whether the point is near the eye.
+fn is_near(surfel: Surfel) -> bool {
+    return has_near_flag(surfel.pixel);
 }
 
 // Whether the point is dropped: nothing is drawn.

@@ -19,6 +19,10 @@ fn add_centers(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
         return;
     }
     let splat = &splats[index];
+    if has_near_flag((*splat).pixel) {
+        // The pixel need not be that of the centre.
+        return;
+    }
     let pixel = pixel_xy((*splat).pixel);
     let place = vec2u(clamp(CENTER_STEPS * ((*splat).center_px - vec2f(pixel)), vec2f(0.0), vec2f(CENTER_STEPS - 1.0)));
     atomicAdd(&centers[pixel.y * frame.size.x + pixel.x], (1u << 24u) | (place.y << 12u) | place.x);

@@ -40,8 +40,10 @@ pub(super) fn add_centers(runs: &[Run], surfels: &[Surfel], tile: Tile, centers:
     let [x0, y0] = tile.origin;
     for run in runs {
         for index in run.tile(tile.index).iter().map(|&index| index as usize) {
-            let [x, y] = surfels[run.first + index].pixel_xy();
-            if x / TILE == x0 / TILE && y / TILE == y0 / TILE {
+            let surfel = &surfels[run.first + index];
+            let [x, y] = surfel.pixel_xy();
+            // The pixel of a near point need not be that of its centre.
+            if !surfel.is_near() && x / TILE == x0 / TILE && y / TILE == y0 / TILE {
                 let at = (y - y0) * TILE + x - x0;
                 centers[at] = centers[at].wrapping_add(one([x, y], run.splats[index].center_px));
             }

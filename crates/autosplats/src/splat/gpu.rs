@@ -49,7 +49,7 @@ const LIBRARY: Library = Library {
         constants!(in centers: CENTER_STEPS),
         constants!(in raster: KERNEL_SLOPE),
         constants!(in setup:
-            DOT_RADIUS_PX, EPSILON_RADII, MAX_AXIS_PER_DEPTH, MIN_FACING_COSINE, RECOVER_DISTANCE_RADII
+            DOT_RADIUS_PX, EPSILON_RADII, MIN_DEPTH_SHARE, MIN_FACING_COSINE, RECOVER_DISTANCE_RADII
         ),
         constants!(in trim:
             ACROSS, CORE_WEIGHT, DECISIVE_SIXTEENTHS, FINE_DIRECTION_SIXTEENTHS, INNER_WEIGHT, LINE_LENGTH_REACHES,

@@ -259,7 +259,12 @@ impl<S: Simd> Brush<S> {
         let dot = (dx * dx + self.dy_squared) * per_dot;
         // The dot reaches beyond the disc, where the disc's plane is meaningless, so depth is clamped to the disc's
         // range.
-        Fragment { squared: (u * u + v * v).min(dot), depth: hit.max(self.low).min(self.high) }
+        let mut squared = (u * u + v * v).min(dot);
+        if self.perspective {
+            // The disc's plane is hit behind the eye.
+            squared = plane.less(F32s::splat(simd, 0.0)).select(dot, squared);
+        }
+        Fragment { squared, depth: hit.max(self.low).min(self.high) }
     }
 }
 #[cfg(test)]

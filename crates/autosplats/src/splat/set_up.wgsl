@@ -31,14 +31,13 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         return;
     }
     let surfel = surfels[index];
-    let c = surfel.center;
+    let c = vec3f(surfel.center.xy, center_depth(surfel.center));
     let n = surfel.normal;
     let a = surfel.major_axis;
     let b = vec3f(n.y * a.z - n.z * a.y, n.z * a.x - n.x * a.z, n.x * a.y - n.y * a.x);
     let perspective = frame.perspective == 1u;
-    let most = select(infinity(), MAX_AXIS_PER_DEPTH * c.z, perspective);
-    let minor = min(SUPPORT * surfel.radius, most);
-    let major = min(SUPPORT * surfel.radius * surfel.major_ratio, most);
+    let minor = SUPPORT * surfel.radius;
+    let major = minor * surfel.major_ratio;
     let place = level_start(SPLATS) + index;
     if !(minor > 0.0) {
         tree[place] = vec2u(NOWHERE);
@@ -75,6 +74,15 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let axis_b = b * minor;
     let center_px = to_pixel(c);
     let across = vec2f(axis_a.z, axis_b.z);
+    let depth_reach = sqrt(across.x * across.x + across.y * across.y);
+    if perspective && !(c.z > 0.0) {
+        // A disc has no sides on a line of sight whose other end meets its centre.
+        let is_opposite = all(center_px > vec2f(-1.0)) && all(center_px < vec2f(frame.size) + 1.0);
+        if is_opposite || !(c.z + depth_reach > 0.0) {
+            tree[place] = vec2u(NOWHERE);
+            return;
+        }
+    }
     let x = extent(c.x, c.z, vec2f(axis_a.x, axis_b.x), across, center_px.x, frame.size.x);
     let y = extent(c.y, c.z, vec2f(axis_a.y, axis_b.y), across, center_px.y, frame.size.y);
     let bounds = vec2u(x, y);
@@ -82,9 +90,32 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     if !is_empty(bounds) && bounds_area(bounds) > MAX_INVOCATION_PX {
         large[atomicAdd(&counters[LARGE], 1u)] = index;
     }
-    let epsilon = EPSILON_RADII * min(surfel.radius, most);
-    let depth_reach = sqrt(across.x * across.x + across.y * across.y);
+    let epsilon = EPSILON_RADII * surfel.radius;
     splats[index] = Splat(center_px, plane, u, v, c.z, epsilon, depth_reach, surfel.pixel);
+}
+
+// Depth of a disc's centre, moved off the plane of the eye.
+fn center_depth(center: vec3f) -> f32 {
+    let least = MIN_DEPTH_SHARE * sqrt(center.x * center.x + center.y * center.y + center.z * center.z);
+    if frame.perspective == 1u && abs(center.z) < least {
+        return select(least, -least, (bitcast<u32>(center.z) >> 31u) == 1u);
+    }
+    return center.z;
+}
+
+// Range of slopes of the part of an ellipse in front of the eye: see the CPU form. Places are an offset aside and a
+// depth.
+fn front_extent(tangents: vec2f, c: vec2f, a: vec2f, b: vec2f) -> vec2f {
+    var range = vec2f(-infinity(), infinity());
+    for (var side = 0u; side < 2u; side++) {
+        let slope = tangents[side];
+        let away = c.x - slope * c.y;
+        let touched = c.y - (a.y * (a.x - slope * a.y) + b.y * (b.x - slope * b.y)) / away;
+        if touched > 0.0 {
+            range[u32(away < 0.0)] = slope;
+        }
+    }
+    return range;
 }
 
 // First and last pixel along an axis whose centre the disc or its dot may cover. `axes` are the coordinates of the
@@ -98,18 +129,35 @@ fn extent(c: f32, cz: f32, axes: vec2f, across: vec2f, center_px: f32, size: u32
         let qa = cz * cz - across.x * across.x - across.y * across.y;
         let qb = c * cz - axes.x * across.x - axes.y * across.y;
         let qc = c * c - squared;
-        let root = sqrt(max(qb * qb - qa * qc, 0.0));
+        let square = qb * qb - qa * qc;
+        let root = sqrt(max(square, 0.0));
         low = (qb - root) / qa;
         high = (qb + root) / qa;
+        if qa <= 0.0 || cz <= 0.0 {
+            // The disc meets the plane of the eye. It ends at the lines of sight that touch it in front of the eye.
+            var range = vec2f(-infinity(), infinity());
+            if square > 0.0 {
+                range = front_extent(vec2f(low, high), vec2f(c, cz), vec2f(axes.x, across.x), vec2f(axes.y, across.y));
+            }
+            low = range.x;
+            high = range.y;
+        }
     } else {
         let reach = sqrt(squared);
         low = c - reach;
         high = c + reach;
     }
     let middle = 0.5 * f32(size);
+    low = low * frame.focal_px + middle;
+    high = high * frame.focal_px + middle;
+    // A centre behind the eye has no dot.
+    if cz > 0.0 || frame.perspective == 0u {
+        low = min(low, center_px - DOT_RADIUS_PX);
+        high = max(high, center_px + DOT_RADIUS_PX);
+    }
     // Pixel i is covered if its centre i + ½ lies within.
-    let first = max(ceil(min(low * frame.focal_px + middle, center_px - DOT_RADIUS_PX) - 0.5), 0.0);
-    let last = min(floor(max(high * frame.focal_px + middle, center_px + DOT_RADIUS_PX) - 0.5), f32(size) - 1.0);
+    let first = max(ceil(low - 0.5), 0.0);
+    let last = min(floor(high - 0.5), f32(size) - 1.0);
     if first <= last {
         return u32(first) | (u32(last) << 16u);
     }

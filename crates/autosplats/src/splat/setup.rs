@@ -4,7 +4,8 @@
 //! Let (dx, dy) be the offset of a pixel's centre from the projected surfel centre. In perspective, the inverse depth
 //! of a plane is linear in (dx, dy), and so are the disc coordinates divided by depth. In parallel projection, depth
 //! and disc coordinates themselves are linear. So a splat is a few gradients, and a pixel costs a few multiplications
-//! and at most one division.
+//! and at most one division. In perspective all this holds for centres behind the eye too. They project through the
+//! eye. The part of the disc in front of the eye is where the inverse depth is positive.
 
 use crate::camera::View;
 use crate::fit::{SUPPORT, Surfel};
@@ -24,8 +25,9 @@ pub(super) const RECOVER_DISTANCE_RADII: f32 = 1.3;
 pub(super) const MIN_FACING_COSINE: f32 = 0.01;
 /// Depth tolerance ε in splat radii: layers of one surface blend, layers further apart occlude.
 pub(super) const EPSILON_RADII: f32 = 1.0;
-/// Largest semi-axis of a splat in perspective, as a share of its depth.
-pub(super) const MAX_AXIS_PER_DEPTH: f32 = 0.5;
+/// Least depth of a disc's centre, before or behind the eye, as a share of its distance from the eye. A centre in the
+/// plane of the eye, which projects nowhere, moves that far.
+pub(super) const MIN_DEPTH_SHARE: f32 = 1.0 / 256.0;
 
 /// A surfel ready to be drawn. Depths and ε are in world units.
 #[derive(Clone, Copy, Debug, Default)]
@@ -64,13 +66,13 @@ impl Splat {
 
     #[inline(always)]
     pub(super) fn new(surfel: &Surfel, view: &View) -> Self {
-        let [cx, cy, cz] = surfel.center;
+        let [cx, cy, _] = surfel.center;
+        let cz = center_depth(surfel.center, view);
         let [nx, ny, nz] = surfel.normal;
         let a = surfel.major_axis;
         let b = [ny * a[2] - nz * a[1], nz * a[0] - nx * a[2], nx * a[1] - ny * a[0]];
-        let most = if view.perspective { MAX_AXIS_PER_DEPTH * cz } else { f32::INFINITY };
-        let minor = (SUPPORT * surfel.radius).min(most);
-        let major = (SUPPORT * surfel.radius * surfel.major_ratio).min(most);
+        let minor = SUPPORT * surfel.radius;
+        let major = minor * surfel.major_ratio;
         if !(minor > 0.0) {
             return Self::NONE;
         }
@@ -100,20 +102,20 @@ impl Splat {
         let [plane, u, v] = if grazing { [[0.0; 2], [per_dot, 0.0], [0.0, per_dot]] } else { [plane, u, v] };
 
         let [axis_a, axis_b] = [a.map(|c| c * major), b.map(|c| c * minor)];
-        let center_px = view.to_pixel(surfel.center.into());
-        let x = extent(0, surfel.center, axis_a, axis_b, center_px[0], view.width, view);
-        let y = extent(1, surfel.center, axis_a, axis_b, center_px[1], view.height, view);
-        Self {
-            center_px,
-            depth: cz,
-            depth_reach: (axis_a[2] * axis_a[2] + axis_b[2] * axis_b[2]).sqrt(),
-            epsilon: EPSILON_RADII * surfel.radius.min(most),
-            plane,
-            u,
-            v,
-            x,
-            y,
+        let depth_reach = (axis_a[2] * axis_a[2] + axis_b[2] * axis_b[2]).sqrt();
+        let center = [cx, cy, cz];
+        let center_px = view.to_pixel(center.into());
+        if view.perspective && !(cz > 0.0) {
+            // A disc has no sides on a line of sight whose other end meets its centre.
+            let is_opposite = |at: f32, size: u32| at > -1.0 && at < size as f32 + 1.0;
+            let [x, y] = center_px;
+            if !(cz + depth_reach > 0.0) || is_opposite(x, view.width) && is_opposite(y, view.height) {
+                return Self::NONE;
+            }
         }
+        let x = extent(0, center, axis_a, axis_b, center_px[0], view.width, view);
+        let y = extent(1, center, axis_a, axis_b, center_px[1], view.height, view);
+        Self { center_px, depth: cz, depth_reach, epsilon: EPSILON_RADII * surfel.radius, plane, u, v, x, y }
     }
 
     /// Approximate reach from the centre, in pixels.
@@ -129,29 +131,59 @@ impl Splat {
     }
 }
 
+/// Depth of a disc's centre, moved off the plane of the eye.
+#[inline(always)]
+fn center_depth([x, y, z]: [f32; 3], view: &View) -> f32 {
+    let least = MIN_DEPTH_SHARE * (x * x + y * y + z * z).sqrt();
+    if view.perspective && z.abs() < least { least.copysign(z) } else { z }
+}
+
 /// First and last pixel along `axis` whose centre the disc or its dot may cover.
 #[inline(always)]
 fn extent(axis: usize, center: [f32; 3], a: [f32; 3], b: [f32; 3], center_px: f32, size: u32, view: &View) -> [u16; 2] {
     let [c, cz] = [center[axis], center[2]];
     let squared = a[axis] * a[axis] + b[axis] * b[axis];
-    let (low, high);
+    let (mut low, mut high);
     if view.perspective {
         // The lines of sight s = x/z that touch the ellipse c + a·cos + b·sin: (c - s·cz)² = (a - s·az)² + (b - s·bz)².
         let qa = cz * cz - a[2] * a[2] - b[2] * b[2];
         let qb = c * cz - a[axis] * a[2] - b[axis] * b[2];
         let qc = c * c - squared;
-        let root = (qb * qb - qa * qc).max(0.0).sqrt();
+        let square = qb * qb - qa * qc;
+        let root = square.max(0.0).sqrt();
         (low, high) = ((qb - root) / qa, (qb + root) / qa);
+        if qa <= 0.0 || cz <= 0.0 {
+            // The disc meets the plane of the eye. It ends at the lines of sight that touch it in front of the eye.
+            let tangents = if square > 0.0 { [low, high] } else { [f32::NAN; 2] };
+            [low, high] = front_extent(tangents, [c, cz], [a[axis], a[2]], [b[axis], b[2]]);
+        }
     } else {
         let reach = squared.sqrt();
         (low, high) = (c - reach, c + reach);
     }
     let middle = 0.5 * size as f32;
     // Pixel i is covered if its centre i + ½ lies within.
-    let low = (low * view.focal_px + middle).min(center_px - DOT_RADIUS_PX) - 0.5;
-    let high = (high * view.focal_px + middle).max(center_px + DOT_RADIUS_PX) - 0.5;
+    let dot_px = if cz > 0.0 || !view.perspective { DOT_RADIUS_PX } else { f32::NAN };
+    let low = (low * view.focal_px + middle).min(center_px - dot_px) - 0.5;
+    let high = (high * view.focal_px + middle).max(center_px + dot_px) - 0.5;
     // Casts from float saturate, so an extent beside the picture must become an empty one explicitly.
     let first = low.ceil().max(0.0);
     let last = high.floor().min(size as f32 - 1.0);
     if first <= last { [first as u16, last as u16] } else { [1, 0] }
+}
+
+/// Range of slopes of the part of an ellipse in front of the eye, which meets the plane of the eye. `tangents` are the
+/// slopes of the lines through the eye that touch it, NaN if there are none. The ellipse has the centre `c` and the
+/// axes `a` and `b`; all places are an offset aside and a depth.
+fn front_extent(tangents: [f32; 2], c: [f32; 2], a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
+    let mut range = [f32::NEG_INFINITY, f32::INFINITY];
+    for slope in tangents {
+        let aside = |p: [f32; 2]| p[0] - slope * p[1];
+        // The ellipse touches the line where the offset c + a·cos + b·sin from it is zero and stationary.
+        let touched = c[1] - (a[1] * aside(a) + b[1] * aside(b)) / aside(c);
+        if touched > 0.0 {
+            range[usize::from(aside(c) < 0.0)] = slope;
+        }
+    }
+    range
 }

@@ -2,12 +2,13 @@
 
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{FieldValues, RelativeValues};
+use glam::Vec3;
 
-use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, MAX_AXIS_PER_DEPTH, MIN_FACING_COSINE};
+use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, MIN_FACING_COSINE};
 use super::{Attributes, GBuffer, PointColors, Splatter};
 use crate::camera::{Camera, Projection, View};
 use crate::fit::{SUPPORT, Surfel};
-use crate::project::Sixteenths;
+use crate::project::{ScreenPoint, Sixteenths};
 use crate::test_clouds::Random;
 
 /// Pictures smaller than a tile, of several tiles, and with tiles that are cut off.
@@ -34,9 +35,8 @@ struct Hit {
 fn hit(surfel: &Surfel, x: usize, y: usize, view: &View) -> Hit {
     let [center, normal, a] = [surfel.center, surfel.normal, surfel.major_axis].map(vector);
     let b = normal.cross(a);
-    let most = if view.perspective { f64::from(MAX_AXIS_PER_DEPTH) * center.z } else { f64::INFINITY };
-    let minor = f64::from(SUPPORT * surfel.radius).min(most);
-    let major = (f64::from(SUPPORT) * f64::from(surfel.radius) * f64::from(surfel.major_ratio)).min(most);
+    let minor = f64::from(SUPPORT * surfel.radius);
+    let major = minor * f64::from(surfel.major_ratio);
     let focal = f64::from(view.focal_px);
     let [dx, dy] = [x as f64 + 0.5 - 0.5 * f64::from(view.width), y as f64 + 0.5 - 0.5 * f64::from(view.height)];
     let (origin, direction) = if view.perspective {
@@ -48,14 +48,20 @@ fn hit(surfel: &Surfel, x: usize, y: usize, view: &View) -> Hit {
     let reach = ((a.z * major).powi(2) + (b.z * minor).powi(2)).sqrt();
     let mut depth = center.z;
     let mut squared = f64::INFINITY;
-    if normal.dot(to_center).abs() > f64::from(MIN_FACING_COSINE) {
+    let opposite = [[center.x, f64::from(view.width)], [center.y, f64::from(view.height)]]
+        .iter()
+        .all(|[at, side]| (focal * at / center.z).abs() < 0.5 * side + 1.0);
+    let is_opposite = view.perspective && center.z <= 0.0 && opposite;
+    if normal.dot(to_center).abs() > f64::from(MIN_FACING_COSINE) && !is_opposite {
         let along = normal.dot(center - origin) / normal.dot(direction);
         let offset = origin + direction * along - center;
-        squared = (offset.dot(a) / major).powi(2) + (offset.dot(b) / minor).powi(2);
+        if !view.perspective || along > 0.0 {
+            squared = (offset.dot(a) / major).powi(2) + (offset.dot(b) / minor).powi(2);
+        }
         depth = along.clamp(center.z - reach, center.z + reach);
     }
-    // Every splat is drawn at least as a dot.
-    let scale = if view.perspective { focal / center.z } else { focal };
+    // Every splat in front of the eye is drawn at least as a dot.
+    let scale = if view.perspective { focal / center.z.max(0.0) } else { focal };
     let from_dot = (dx - center.x * scale).hypot(dy - center.y * scale) / f64::from(DOT_RADIUS_PX);
     Hit { squared: squared.min(from_dot * from_dot), depth }
 }
@@ -64,9 +70,8 @@ fn kernel(squared: f64) -> f64 {
     (1.0 - 0.52 * squared).powi(8)
 }
 
-fn epsilon(surfel: &Surfel, view: &View) -> f64 {
-    let most = if view.perspective { MAX_AXIS_PER_DEPTH * surfel.center[2] } else { f32::INFINITY };
-    f64::from(EPSILON_RADII * surfel.radius.min(most))
+fn epsilon(surfel: &Surfel) -> f64 {
+    f64::from(EPSILON_RADII * surfel.radius)
 }
 
 /// Weighted sums of a pixel.
@@ -96,13 +101,14 @@ fn oracle(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> V
             all.filter(|(_, hit)| hit.squared <= 1.0 + 1e-3).collect()
         })
         .collect();
-    let pushed = |&(index, ref hit): &(usize, Hit)| hit.depth + epsilon(&surfels[index], view);
+    let pushed = |&(index, ref hit): &(usize, Hit)| hit.depth + epsilon(&surfels[index]);
     let mut alive = vec![true; surfels.len()];
     let mut depth_map = vec![f64::INFINITY; width * height];
     for redraw in 0..=refinements {
         if redraw > 0 {
             for (alive, surfel) in alive.iter_mut().zip(surfels) {
-                let limit = depth_map[(surfel.pixel >> 16) as usize * width + (surfel.pixel & 0xffff) as usize];
+                let [x, y] = surfel.pixel_xy();
+                let limit = depth_map[y * width + x];
                 let depth = f64::from(surfel.center[2]);
                 assert!(
                     (depth - limit).abs() > 1e-6 * depth,
@@ -121,7 +127,7 @@ fn oracle(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> V
         let mut heaviest = [0.0; 2];
         for (index, hit) in hits.iter().filter(|(index, _)| alive[*index]) {
             let surfel = &surfels[*index];
-            let front = hit.depth + epsilon(surfel, view) <= limit + 1e-4 * hit.depth;
+            let front = hit.depth + epsilon(surfel) <= limit + 1e-4 * hit.depth;
             if (hit.depth - limit).abs() < 2e-5 * hit.depth || ((hit.squared - 1.0).abs() < 1e-3 && front) {
                 return None;
             }
@@ -277,8 +283,10 @@ pub(super) enum Discs {
     Grazing,
     /// About a pixel wide.
     Small,
-    /// Large and near the eye.
+    /// Large and near the eye; many meet the plane of the eye.
     Near,
+    /// Large, around the eye, and mostly beside the screen or behind the eye; in parallel projection merely large.
+    Around,
     /// A smooth wavy surface.
     Surface,
 }
@@ -290,10 +298,18 @@ pub(super) fn surfels(seed: u64, count: usize, discs: Discs, view: &View) -> Vec
         let px = [random.unit() * view.width as f32, random.unit() * view.height as f32];
         let depth = match discs {
             Discs::Near => 0.05 + 0.2 * random.unit(),
+            // Beyond the least share of the distance.
+            Discs::Around if view.perspective => {
+                let far = 0.02 + 0.28 * random.unit();
+                far.copysign(random.signed())
+            }
             Discs::Surface => 4.0 + 0.1 * (0.2 * px[0]).sin(),
             _ => 2.0 + 3.0 * random.unit(),
         };
-        let center = view.unproject(px, depth);
+        let center = match discs {
+            Discs::Around if view.perspective => Vec3::new(random.signed(), random.signed(), depth),
+            _ => view.unproject(px, depth),
+        };
         let to_eye = if view.perspective { -vector(center.to_array()).normalize() } else { DVec3::NEG_Z };
         let turn = vector(random.direction());
         let sideways = turn.reject_from_normalized(to_eye).normalize();
@@ -308,10 +324,11 @@ pub(super) fn surfels(seed: u64, count: usize, discs: Discs, view: &View) -> Vec
                 }
             }
         };
-        let pixel_size = view.pixel_size(depth);
+        let pixel_size = view.pixel_size(depth.abs());
         let radius = match discs {
             Discs::Small => pixel_size * (0.1 + 2.0 * random.unit()),
             Discs::Near => 0.4 * random.unit(),
+            Discs::Around => 0.9 * random.unit(),
             _ => pixel_size * (1.0 + 12.0 * random.unit() * random.unit()),
         };
         let major_axis = vector(random.direction()).reject_from(normal).normalize();
@@ -323,7 +340,7 @@ pub(super) fn surfels(seed: u64, count: usize, discs: Discs, view: &View) -> Vec
             major_axis: major_axis.as_vec3().to_array(),
             major_ratio: if discs == Discs::Ellipses { 1.0 + 3.0 * random.unit() } else { 1.0 },
             curvature: 0.3 * random.unit(),
-            pixel: (px[1] as u32) << 16 | px[0] as u32,
+            pixel: (px[1] as u32) << 16 | px[0] as u32 | if discs == Discs::Around { ScreenPoint::NEAR } else { 0 },
             source: source as u32,
             screen_and_flags: source as u32 | if shows_back(source) { Surfel::BACK } else { 0 },
         }
@@ -331,8 +348,8 @@ pub(super) fn surfels(seed: u64, count: usize, discs: Discs, view: &View) -> Vec
     (0..count).map(&mut one).collect()
 }
 
-pub(super) const ALL_DISCS: [Discs; 6] =
-    [Discs::Circles, Discs::Ellipses, Discs::Grazing, Discs::Small, Discs::Near, Discs::Surface];
+pub(super) const ALL_DISCS: [Discs; 7] =
+    [Discs::Circles, Discs::Ellipses, Discs::Grazing, Discs::Small, Discs::Near, Discs::Around, Discs::Surface];
 
 #[test]
 fn every_kind_of_disc_at_every_size() {

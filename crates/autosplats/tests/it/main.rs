@@ -9,6 +9,7 @@ mod backends;
 mod extremes;
 mod first_view;
 mod kd_tree;
+mod near;
 mod pools;
 mod properties;
 mod ranges;

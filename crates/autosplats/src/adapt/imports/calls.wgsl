@@ -19,11 +19,12 @@ fn most_scatter(noise: f32, known: bool) -> f32 {
 // Whether the first neighbours of a surfel form a scan line. Depth steps of a camera with known noise look alike but
 // are not on the surface.
 fn is_row(surfel: Surfel, known_noise: f32) -> bool {
-    return !is_dropped(surfel) && surfel.major_ratio > MIN_SCAN_LINE_ANISOTROPY && known_noise == 0.0;
+    let is_fitted = !is_dropped(surfel) && !is_near(surfel);
+    return is_fitted && surfel.major_ratio > MIN_SCAN_LINE_ANISOTROPY && known_noise == 0.0;
 }
 
 // Whether noise calls for more than the first neighbours. Their normal's standard error is about the noise over the
 // k-radius.
 fn calls(surfel: Surfel, noise: f32, enough: f32) -> bool {
-    return !is_dropped(surfel) && noise > enough * surfel.k_radius;
+    return !is_dropped(surfel) && !is_near(surfel) && noise > enough * surfel.k_radius;
 }

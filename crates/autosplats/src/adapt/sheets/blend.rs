@@ -207,7 +207,8 @@ impl Sheets {
         let per_total = 1.0 / total;
         Blend::Surface(Surface {
             offset: sum.offset * per_total,
-            normal: sum.normal.normalize(),
+            // Weights may be so small that their squares are zero.
+            normal: (sum.normal * per_total).normalize(),
             curvature: sum.curvature * per_total,
         })
     }

@@ -27,6 +27,7 @@ pub(crate) fn read_screen(gpu: &Gpu, screen: &ScreenBuffers) -> (ScreenPoints, V
         source: list(&screen.source, counter(Counter::Visible)),
         active: list(&screen.queries, counter(Counter::Active)),
         passive: list(&screen.passive, counter(Counter::Passive)),
+        near_first: counter(Counter::NearFirst),
         ..ScreenPoints::default()
     };
     read.cells.strip_px = strip_px;
@@ -48,6 +49,7 @@ pub(crate) fn upload_screen(gpu: &Gpu, screen: &ScreenPoints, view: &View) -> Sc
     let mut counters = [0u32; COUNTERS];
     for (counter, value) in [
         (Counter::Visible, screen.points.len()),
+        (Counter::NearFirst, screen.near_first),
         (Counter::StripPx, screen.cells.strip_px),
         (Counter::CellPx, screen.density.cell_px),
         (Counter::CellColumns, screen.density.columns),
@@ -101,6 +103,7 @@ fn project<'a>(
     let told = FrameUniform {
         halves: rules.halves.into(),
         grid_culling: rules.grid_culling.into(),
+        near_cells: (rules.near && view.perspective).into(),
         ..FrameUniform::new(view, K)
     };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
@@ -138,7 +141,7 @@ fn the_device_finds_what_the_host_finds() {
                 ([97, 250], 0, [false, false]),
                 ([60, 41], 31, [true, false]),
             ] {
-                let rules = ProjectRules { k: K, halves, grid_culling };
+                let rules = ProjectRules { k: K, halves, grid_culling, near: margin > 0 };
                 let view = camera.view(DVec3::ZERO, size).expect("a view").with_margin(margin);
                 let mut projector = Projector::default();
                 let host = projector.project(&cloud, &view, &rules, &crate::cancel::NEVER);
@@ -164,6 +167,7 @@ fn the_device_finds_what_the_host_finds() {
 }
 
 fn assert_same(host: &ScreenPoints, device: &ScreenPoints, case: &str) {
+    assert_eq!(device.near_first, host.near_first, "{case}: screen points");
     assert_eq!(device.source, host.source, "{case}: order");
     assert_eq!(device.cells.strip_px, host.cells.strip_px, "{case}: strips");
     assert_eq!(device.cells.start, host.cells.start, "{case}: cells");

@@ -6,6 +6,7 @@
 #import screen
 
 fn is_active(point: ScreenPoint, cell: DensityCell, cell_px: u32) -> bool {
-    let is_culled = frame.grid_culling == 1u && point.position_view.z > culling_depth(cell.nearest, cell_px);
+    let may_cull = frame.grid_culling == 1u && !has_near_flag(point.pixel);
+    let is_culled = may_cull && point.position_view.z > culling_depth(cell.nearest, cell_px);
     return matters(point, cell, cell_px) && !is_culled;
 }

@@ -315,6 +315,7 @@ fn uniform(view: &View, rules: &Rules, engine: SearchEngine) -> FrameUniform {
     FrameUniform {
         halves: project.halves.into(),
         grid_culling: project.grid_culling.into(),
+        near_cells: (project.near && view.perspective).into(),
         lenient: search.lenient.into(),
         outlier_growth: search.outlier_radius(1.0),
         gap_growth: search.gap_factor.map_or(f32::INFINITY, f32::sqrt),

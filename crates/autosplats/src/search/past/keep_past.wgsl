@@ -19,6 +19,10 @@ fn keep_past(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     if index >= counters[ACTIVE] + counters[RECOVERED] || neighborhoods[index].count < f32(frame.k) {
         return;
     }
-    let pixel = pixel_xy(points[queries[index]].pixel);
+    let point = points[queries[index]];
+    if has_near_flag(point.pixel) {
+        return;
+    }
+    let pixel = pixel_xy(point.pixel);
     atomicMax(&past[pixel.y * frame.size.x + pixel.x], bitcast<u32>(neighborhoods[index].k_radius));
 }

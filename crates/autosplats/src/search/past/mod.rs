@@ -118,8 +118,9 @@ impl Past {
         let Some((PlacedView { view, .. }, k)) = self.next.seen else { return };
         queries.par_chunks(LANES).zip(&neighborhoods.blocks).with_min_len(64).for_each(|(queries, block)| {
             for (lane, &query) in queries.iter().enumerate() {
-                if block.count.0[lane] >= k as f32 {
-                    let [x, y] = screen.points[query as usize].pixel_xy();
+                let point = &screen.points[query as usize];
+                if block.count.0[lane] >= k as f32 && !point.is_near() {
+                    let [x, y] = point.pixel_xy();
                     // The maximum picks the same one of a pixel's two points in every run.
                     let pixel = &self.next.pixels[y * view.width as usize + x];
                     pixel.fetch_max(block.k_radius.0[lane].to_bits(), Ordering::Relaxed);

@@ -97,6 +97,8 @@ struct Block {
     /// K-radius in the last frame; 0 if unknown.
     likely: Lanes,
     pending: [bool; LANES],
+    /// Whether a lane's neighbours are sought among the points of sparse cells.
+    near: [bool; LANES],
 }
 
 #[pulp::with_simd(search_blocks = pulp::Arch::new())]
@@ -127,14 +129,16 @@ fn search_block<S: Simd>(
     let SearchInput { screen, view, rules, .. } = *task;
     let mut block = Block::new(task, queries, scratch.reach, &mut scratch.trust);
     while block.pending.contains(&true) {
-        let (window, group) = block.next_window(task);
-        let everything = window.is_all();
-        let crowded = window.candidates(&screen.cells) > MIN_CROWDED_CANDIDATES;
+        let near = block.pending_near();
+        let (window, group) = if near.contains(&true) { (Window::EMPTY, near) } else { block.next_window(task) };
+        let of_near = near.contains(&true);
+        let everything = of_near | window.is_all();
+        let crowded = !of_near && window.candidates(&screen.cells) > MIN_CROWDED_CANDIDATES;
         let mut bound: [f32; LANES] = std::array::from_fn(|lane| match crowded & group[lane] {
             true => block.bound_radius(lane, task),
             false => f32::INFINITY,
         });
-        let candidates = gather(screen, &window, &mut scratch.candidates);
+        let candidates = gather(screen, if of_near { None } else { Some(&window) }, &mut scratch.candidates);
         let padded = candidates.next_multiple_of(CANDIDATE_GROUP);
         squared_distances(simd, &block.position, &scratch.candidates[..padded], &mut scratch.squared);
         let enough = candidates > rules.k as usize;
@@ -149,7 +153,7 @@ fn search_block<S: Simd>(
                 exact[lane] = group[lane] & inside & block.threshold.0[lane].is_finite();
                 // The bound applies where few points were read too, if there are many a little further out. The result
                 // then does not depend on what was read.
-                if exact[lane] & !crowded && !spheres[lane].is_small() && block.meets_bound(lane, task) {
+                if exact[lane] & !crowded & !of_near && !spheres[lane].is_small() && block.meets_bound(lane, task) {
                     bound[lane] = block.bound_radius(lane, task);
                 }
                 exact[lane] &= block.threshold.0[lane].sqrt() <= bound[lane];
@@ -326,6 +330,7 @@ impl Block {
             threshold: Lanes::default(),
             likely: Lanes::default(),
             pending: [true; LANES],
+            near: [false; LANES],
         };
         let looks_back = trust.looks_back();
         for lane in 0..LANES {
@@ -336,7 +341,12 @@ impl Block {
             }
             let radius = screen.density.initial_radius(point, rules.k, view);
             block.initial_radius.0[lane] = radius;
-            let (mut likely, mut slack) = (reach * radius, FIRST_WINDOW_SLACK);
+            block.near[lane] = point.is_near();
+            let (mut likely, mut slack) = if point.is_near() {
+                (point.position_view[2].abs(), 1.0)
+            } else {
+                (reach * radius, FIRST_WINDOW_SLACK)
+            };
             if looks_back && let Some(past_radius) = past.radius(point.position_view, radius) {
                 block.likely.0[lane] = past_radius;
                 if let Some(past_slack) = trust.slack() {
@@ -355,7 +365,7 @@ impl Block {
     /// those that found k neighbours.
     #[inline(always)]
     fn reach(&self, lanes: usize, out: &NeighborhoodBlock, k: u32) -> f32 {
-        let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32);
+        let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32 && !self.near[lane]);
         let ratios = full.map(|lane| out.k_radius.0[lane] / self.initial_radius.0[lane]);
         let (count, sum) = ratios.fold((0.0, 0.0), |(count, sum), ratio| (count + 1.0, sum + ratio));
         let [least, most] = EXPECTED_FIRST_RADII_RANGE;
@@ -403,6 +413,12 @@ impl Block {
         [self.position[0].0[lane], self.position[1].0[lane], self.position[2].0[lane]]
     }
 
+    /// The lanes that are pending and near.
+    #[inline(always)]
+    fn pending_near(&self) -> [bool; LANES] {
+        std::array::from_fn(|lane| self.pending[lane] & self.near[lane])
+    }
+
     /// The window to read next, and the lanes that the window serves.
     #[inline(always)]
     fn next_window(&self, task: &SearchInput) -> (Window, [bool; LANES]) {
@@ -438,9 +454,17 @@ impl Block {
     }
 }
 
-/// Lists the screen points in `window` at the front of `candidates`, then a group at infinity; returns their number.
+/// Lists the screen points in `window`, or the points of sparse cells if it is `None`, at the front of `candidates`,
+/// then a group at infinity; returns their number.
 #[inline(always)]
-fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>) -> usize {
+fn gather(screen: &ScreenPoints, window: Option<&Window>, candidates: &mut Vec<[f32; 3]>) -> usize {
+    let Some(window) = window else {
+        candidates.clear();
+        candidates.extend(screen.points[screen.near_first..].iter().map(|point| point.position_view));
+        let len = candidates.len();
+        candidates.resize(len + CANDIDATE_GROUP, [f32::INFINITY; 3]);
+        return len;
+    };
     let most = window.candidates(&screen.cells);
     if candidates.len() < most + CANDIDATE_GROUP {
         candidates.resize(most + CANDIDATE_GROUP, [0.0; 3]);

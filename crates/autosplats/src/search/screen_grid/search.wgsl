@@ -135,7 +135,8 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> Win
 }
 
 // Searches the neighbourhood of one query. `task`, the counts of the frame, is defined in `search_task`.
-fn find(query: u32, center: vec3f, initial_radius: f32) -> SearchResult {
+// A near point has an infinite first radius, to which no rule applies.
+fn find(query: u32, center: vec3f, initial_radius: f32, of_near: bool) -> SearchResult {
     let strip_px = f32(task.strip_px);
     let outlier_radius = frame.outlier_growth * initial_radius;
     let farthest_first = select(1.0, OUTLIER_RADIUS_SLACK, frame.lenient == 1u) * outlier_radius;
@@ -144,6 +145,10 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> SearchResult {
     var radius = max(select(FIRST_WINDOW_SLACK * initial_radius, PAST_RADIUS_SLACK * likely, likely > 0.0), MIN_POSITIVE);
     var window = window_grown(window_of_sphere(center, radius), strip_px);
     var len = window_len(window, task.strip_px, MIN_CROWDED_CANDIDATES);
+    if of_near {
+        window = near_window();
+        len = 1u;
+    }
     // A point alone in its cell may look into a crowd, where a smaller window suffices.
     for (var halving = 0u; halving < 40u && len > MAX_CANDIDATES; halving++) {
         radius *= 0.5;
@@ -157,10 +162,11 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> SearchResult {
         var nearest = read_window(query, center, window);
         let kth_squared = nearest_last(&nearest);
         let kth_radius = sqrt(kth_squared);
-        let is_all = window_contains(window, picture());
+        let is_all = of_near || window_contains(window, picture());
         // The bound applies where few points were read too, if there are many a little further out. The result then
         // does not depend on what was read.
-        let is_crowded = len > MIN_CROWDED_CANDIDATES || (kth_squared < MAX_F32 && !is_unbounded(center, kth_radius));
+        let may_crowd = !of_near && kth_squared < MAX_F32;
+        let is_crowded = len > MIN_CROWDED_CANDIDATES || (may_crowd && !is_unbounded(center, kth_radius));
         if is_crowded && farthest == 0.0 {
             farthest = bound_radius(center, initial_radius);
         }
@@ -233,9 +239,12 @@ fn bound_radius(center: vec3f, initial_radius: f32) -> f32 {
 }
 
 // Sums the points up to a squared distance, about the point itself.
-fn moments(center: vec3f, squared: f32) -> Neighborhood {
+fn moments(center: vec3f, squared: f32, of_near: bool) -> Neighborhood {
     let radius = sqrt(squared);
-    let window = window_of_sphere(center, radius);
+    var window = near_window();
+    if !of_near {
+        window = window_of_sphere(center, radius);
+    }
     let strips = window_strips(window, task.strip_px);
     // The point itself adds to the count only.
     var sums = Neighborhood(vec3f(0.0), -1.0, vec3f(0.0), radius, vec3f(0.0), 0u);
@@ -272,9 +281,13 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         let query = queries[task.first + index];
         let point = points[query];
         let cell = density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns);
-        let initial_radius = initial_radius_of(density[cell].count, task.cell_px, point.position_view.z);
-        let found = find(query, point.position_view, initial_radius);
-        neighborhoods[task.first + index] = moments(point.position_view, found.squared);
+        let of_near = has_near_flag(point.pixel);
+        var initial_radius = initial_radius_of(density[cell].count, task.cell_px, point.position_view.z);
+        if of_near {
+            initial_radius = infinity();
+        }
+        let found = find(query, point.position_view, initial_radius, of_near);
+        neighborhoods[task.first + index] = moments(point.position_view, found.squared, of_near);
         if found.is_clamped {
             atomicAdd(&clamped, 1u);
         }

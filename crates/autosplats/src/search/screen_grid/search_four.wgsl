@@ -320,15 +320,18 @@ fn search_four(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     if first < task.len {
         var four: Four;
         var initial_radius: vec4f;
+        // Near points are left to `search`.
+        var of_screen: vec4<bool>;
         for (var lane = 0u; lane < 4u; lane++) {
             let point = points[queries[task.first + min(first + lane, task.len - 1u)]];
             let cell = density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns);
+            of_screen[lane] = !has_near_flag(point.pixel);
             four.x[lane] = point.position_view.x;
             four.y[lane] = point.position_view.y;
             four.z[lane] = point.position_view.z;
             initial_radius[lane] = initial_radius_of(density[cell].count, task.cell_px, point.position_view.z);
         }
-        found = find(four, initial_radius, valid);
+        found = find(four, initial_radius, valid & of_screen);
         sum_moments(four, found, first);
     }
     // The other queries go to a list, whose order does not matter.

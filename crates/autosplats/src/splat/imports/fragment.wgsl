@@ -77,7 +77,9 @@ fn pushed_depth(splat: Splat, line: Line, column: u32, rim: f32) -> u32 {
     }
     let disc = u * u + v * v;
     let dot = (dx * dx + line.dy * line.dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
-    if select(dot, disc, disc < dot) <= rim {
+    // Below an inverse depth of zero, the disc's plane is hit behind the eye.
+    let is_ahead = frame.perspective == 0u || plane >= 0.0;
+    if select(dot, disc, is_ahead && disc < dot) <= rim {
         // The dot reaches beyond the disc, where the disc's plane is meaningless.
         let hit = min(max(depth, line.nearest), line.furthest);
         return depth_key(hit + splat.epsilon);

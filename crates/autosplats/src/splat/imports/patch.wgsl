@@ -282,5 +282,7 @@ fn fragments(brush: Brush, x: f32, y: vec4f) -> Fragments {
     let dot = (dx * dx + dy * dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
     // The dot reaches beyond the disc, where the disc's plane is meaningless and `disc` may be NaN.
     let low = vec4f(brush.low);
-    return Fragments(select(dot, disc, disc < dot), min(max(depth, low), vec4f(brush.high)));
+    // Below an inverse depth of zero, the disc's plane is hit behind the eye.
+    let is_ahead = vec4<bool>(frame.perspective == 0u) | (plane >= vec4f(0.0));
+    return Fragments(select(dot, disc, is_ahead & (disc < dot)), min(max(depth, low), vec4f(brush.high)));
 }

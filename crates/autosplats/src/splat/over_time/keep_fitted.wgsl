@@ -26,7 +26,7 @@ fn keep_fitted(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     let point = points[screen_of(surfel)].position_view;
     fitted[index] = Fitted(surfel.center - point, surfel.source, surfel.normal, frames[index]);
     let at = to_pixel(point);
-    if !is_dropped(surfel) && all(at >= vec2f(0.0)) && all(at < vec2f(frame.size)) {
+    if !is_dropped(surfel) && !is_near(surfel) && all(at >= vec2f(0.0)) && all(at < vec2f(frame.size)) {
         // Rounding may put two points into one half. The maximum always keeps the same one.
         atomicMax(&halves[half_at(vec2u(4.0 * at))], index + 1u);
     }

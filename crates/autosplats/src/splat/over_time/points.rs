@@ -117,6 +117,7 @@ impl<M: PartialEq> OverTime<M> {
                 let offset = (Vec3::from(surfel.center) - point).to_array();
                 *fitted = Fitted { offset, source: surfel.source, normal: surfel.normal, frames };
                 if !surfel.is_dropped()
+                    && !surfel.is_near()
                     && let Some(half) = half_at(view.to_pixel(point), view)
                 {
                     // Rounding may put two points into one half. The maximum always keeps the same one.

@@ -32,9 +32,9 @@ fn field_size<S, F>(_: impl Fn(&S) -> &F) -> usize {
 }
 
 macro_rules! mirrored {
-    ($name:literal, $rust:ident { $($field:ident),* $(,)? } $(, filled up with $unused:ident)?) => {{
+    ($name:literal, $rust:ident { $($field:ident),* $(,)? }) => {{
         // Does not compile if a field is missing.
-        let $rust { $($field: _,)* $($unused: _)? } = <$rust as bytemuck::Zeroable>::zeroed();
+        let $rust { $($field: _,)* } = <$rust as bytemuck::Zeroable>::zeroed();
         let fields = vec![$((
             stringify!($field).to_owned(),
             offset_of!($rust, $field),
@@ -76,8 +76,8 @@ fn mirrored() -> [Mirrored; 16] {
                 dot_px,
                 scan_lines,
                 compares_density,
-            },
-            filled up with padding
+                near_cells,
+            }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, slot_shift, slots }),
         mirrored!("Arguments", Arguments { points, queries, clear, boxes, last_clear, last_boxes, count, iterations }),

@@ -11,6 +11,8 @@ struct SearchTask {
     // Number of queries that `search_four` leaves to `search`.
     left: u32,
     visible: u32,
+    // First point of the sparse cells around the eye.
+    near_first: u32,
     strip_px: u32,
     cell_px: u32,
     cell_columns: u32,
@@ -30,6 +32,7 @@ fn task_load() {
     task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
     task.left = atomicLoad(&counters[left_counter()]);
     task.visible = atomicLoad(&counters[VISIBLE]);
+    task.near_first = atomicLoad(&counters[NEAR_FIRST]);
     task.strip_px = atomicLoad(&counters[STRIP_PX]);
     task.cell_px = atomicLoad(&counters[CELL_PX]);
     task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);

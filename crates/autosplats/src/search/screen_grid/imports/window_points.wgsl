@@ -1,6 +1,7 @@
 // Screen points in windows. The including pass binds `cell_start`.
 
 #import frame
+#import search_task
 #import window
 
 // Approximate number of loop rounds: strips visited, plus half the screen points read. Software devices end an
@@ -18,13 +19,22 @@ fn window_contains(outer: Window, inner: Window) -> bool {
     return all(outer.low <= inner.low) && all(outer.high >= inner.high);
 }
 
+// The window of the points of sparse cells around the eye, among which near points have their neighbours. It lies
+// beside the screen.
+fn near_window() -> Window {
+    return Window(vec2f(-1.0), vec2f(-1.0));
+}
+
 // First and last strip of a window.
 fn window_strips(window: Window, strip_px: u32) -> vec2u {
-    return vec2u(u32(window.low.y), u32(window.high.y)) / strip_px;
+    return vec2u(u32(max(window.low.y, 0.0)), u32(max(window.high.y, 0.0))) / strip_px;
 }
 
 // Screen points of a strip in the window's columns, which are contiguous: first index, and end.
 fn window_run(window: Window, strip: u32) -> vec2u {
+    if window.low.x < 0.0 {
+        return vec2u(task.near_first, task.visible);
+    }
     let row = strip * frame.size.x;
     return vec2u(cell_start[row + u32(window.low.x)], cell_start[row + u32(window.high.x) + 1u]);
 }

@@ -1,0 +1,100 @@
+// Lists the points of the sparse cells around the eye after the screen points, if any is near: see `near.rs`.
+//
+// Reads: near. Reads and writes: counters. Writes: source. One workgroup; each invocation takes a run of cells.
+
+#import frame
+#import near_cells
+#import near_points
+
+@group(0) @binding(1) var<storage, read> near: array<u32>;
+@group(0) @binding(2) var<storage, read_write> counters: array<u32>;
+@group(0) @binding(3) var<storage, read_write> source: array<u32>;
+
+const CELLS_EACH = NEAR_CELLS / LARGE_GROUP;
+
+var<workgroup> before: array<u32, LARGE_GROUP + 1u>;
+// Octave of the nearest crowded cell.
+var<workgroup> crowded: atomic<u32>;
+// 1 if any point is near.
+var<workgroup> any_near: atomic<u32>;
+
+// Number of points of a cell if it is listed, else 0.
+fn listed_len(cell: u32) -> u32 {
+    let is_listed = near[cell] <= SPARSE_POINTS && octave_of(cell) <= atomicLoad(&crowded) + LISTED_OCTAVES;
+    return select(0u, near[cell], is_listed);
+}
+
+// Whether an entry comes before another: by the bits of positions, then by index.
+fn is_before(a: u32, b: u32) -> bool {
+    for (var word = 1u; word < ENTRY_WORDS; word++) {
+        if near[a + word] != near[b + word] {
+            return near[a + word] < near[b + word];
+        }
+    }
+    return near[a] < near[b];
+}
+
+@compute @workgroup_size(LARGE_GROUP)
+fn list_near(@builtin(local_invocation_index) local: u32) {
+    let first = local * CELLS_EACH;
+    if local == 0u {
+        atomicStore(&crowded, OCTAVES);
+        atomicStore(&any_near, 0u);
+    }
+    workgroupBarrier();
+    for (var cell = first; cell < first + CELLS_EACH; cell++) {
+        if near[cell] > SPARSE_POINTS {
+            atomicMin(&crowded, octave_of(cell));
+        }
+    }
+    workgroupBarrier();
+    var own = 0u;
+    for (var cell = first; cell < first + CELLS_EACH; cell++) {
+        let len = listed_len(cell);
+        own += len;
+        for (var entry = 0u; entry < len && len <= NEAR_POINTS && atomicLoad(&any_near) == 0u; entry++) {
+            let at = near_entries(cell) + entry * ENTRY_WORDS;
+            let place = bitcast<vec3f>(vec3u(near[at + 1u], near[at + 2u], near[at + 3u]));
+            if is_near_at(place, atomicLoad(&crowded)) {
+                atomicStore(&any_near, 1u);
+            }
+        }
+    }
+    before[local + 1u] = own;
+    workgroupBarrier();
+    if local == 0u {
+        before[0] = 0u;
+        for (var run = 1u; run <= LARGE_GROUP; run++) {
+            before[run] += before[run - 1u];
+        }
+    }
+    workgroupBarrier();
+    let total = before[LARGE_GROUP];
+    let is_listed = frame.near_cells == 1u && atomicLoad(&any_near) == 1u && total > frame.k && total <= MOST_NEAR;
+    let visible = counters[VISIBLE];
+    // All have read the counter before one changes it.
+    workgroupBarrier();
+    if local == 0u {
+        counters[NEAR_FIRST] = visible;
+        counters[CROWDED_OCTAVE] = atomicLoad(&crowded);
+        counters[VISIBLE] = visible + select(0u, total, is_listed);
+    }
+    if !is_listed {
+        return;
+    }
+    var place = visible + before[local];
+    for (var cell = first; cell < first + CELLS_EACH; cell++) {
+        let len = listed_len(cell);
+        let first_entry = near_entries(cell);
+        // Entries are in any order: each counts those before it.
+        for (var entry = 0u; entry < len; entry++) {
+            let own_entry = first_entry + entry * ENTRY_WORDS;
+            var rank = 0u;
+            for (var other = 0u; other < len; other++) {
+                rank += u32(is_before(first_entry + other * ENTRY_WORDS, own_entry));
+            }
+            source[place + rank] = near[own_entry];
+        }
+        place += len;
+    }
+}

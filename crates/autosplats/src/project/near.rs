@@ -1,0 +1,158 @@
+//! Points near the eye: those on surfaces that the eye is closer to than a few of their distances.
+//!
+//! # How it works
+//! Space is cut into cells by direction from the eye and by octave of distance. Each cell looks about equally large
+//! from the eye. A cell with few points is *sparse*: its points are far apart, measured by their distance from the eye.
+//! The screen serves such points badly. Their neighbours lie beside the screen or behind the eye, and their discs reach
+//! into the picture from there. A density per pixel counts hardly one of them.
+//!
+//! So the points of sparse cells are listed once more, after the screen points, wherever they lie. Those of the
+//! sparsest cells are *near*, unless a crowded cell is nearer to the eye. Near points seek their neighbours in that
+//! list, in space. Their entries among the screen points are silent, which means that they serve as neighbours only. A
+//! point close to a crowded cell is not near, because the list lacks its neighbours. See
+//! docs/decisions/0040-close-to-the-eye.md.
+// Differs from the paper: the paper knows no points outside the picture.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use super::SlotTable;
+use crate::camera::View;
+
+/// Cells along the side of a face of the cube of directions.
+pub(super) const FACE_CELLS: usize = 8;
+/// Octaves of distance; nearer and more distant points share the cells of the first and last.
+pub(super) const OCTAVES: usize = 20;
+/// The first octave ends this many octaves beyond the near plane, at a thousandth of the way to where the eye looks.
+pub(super) const FIRST_OCTAVE: u32 = 6;
+/// Number of cells.
+pub(crate) const NEAR_CELLS: usize = OCTAVES * 6 * FACE_CELLS * FACE_CELLS;
+/// Most points of a sparse cell.
+pub(crate) const SPARSE_POINTS: u32 = 32;
+/// Most points of a cell whose points are near. A surface then is nearer than about twelve of its points' distances.
+pub(crate) const NEAR_POINTS: u32 = 16;
+/// Reach, as a share of the distance from the eye, within which a near point has sparse cells only.
+pub(crate) const NEAR_REACH: f32 = 0.15;
+/// Octaves beyond the nearest crowded cell whose sparse cells are listed, as neighbours.
+pub(super) const LISTED_OCTAVES: u32 = 1;
+/// Most points in the list of sparse cells. Beyond, no point is near: the work per neighbourhood is the list.
+pub(crate) const MOST_NEAR: usize = 4096;
+
+/// The points of a frame per cell.
+#[derive(Debug, Default)]
+pub(super) struct NearCells {
+    counts: Vec<AtomicU32>,
+    /// [`SPARSE_POINTS`] indices of points for each cell; as many as counted are valid, in any order.
+    entries: Vec<AtomicU32>,
+    /// The octave of the nearest crowded cell.
+    crowded: u32,
+    /// Number of the first octave.
+    first_octave: u32,
+    /// Indices of the points of sparse cells, cell by cell, by the bits of their positions in each.
+    pub(super) listed: Vec<u32>,
+}
+
+/// Number of the first octave for a near plane.
+pub(super) fn first_octave(near: f32) -> u32 {
+    (near.to_bits() >> 23) + FIRST_OCTAVE
+}
+
+/// Cell of a position in view space.
+#[inline(always)]
+pub(super) fn cell([x, y, z]: [f32; 3], first_octave: u32) -> u32 {
+    let most = x.abs().max(y.abs()).max(z.abs());
+    let (is_x, is_y) = (x.abs() == most, y.abs() == most);
+    let [axis, along, u, v] = match (is_x, is_y) {
+        (true, _) => [0.0, x, y, z],
+        (false, true) => [2.0, y, x, z],
+        (false, false) => [4.0, z, x, y],
+    };
+    let face = axis as u32 + u32::from(along < 0.0);
+    let half = 0.5 * FACE_CELLS as f32;
+    let scale = half / most;
+    // The casts saturate, so a point at the eye has a cell as well.
+    let [column, row] = [u, v].map(|c| ((c * scale + half) as u32).min(FACE_CELLS as u32 - 1));
+    let octave = (most.to_bits() >> 23).saturating_sub(first_octave).min(OCTAVES as u32 - 1);
+    ((octave * 6 + face) * FACE_CELLS as u32 + row) * FACE_CELLS as u32 + column
+}
+
+fn octave_of(cell: u32) -> u32 {
+    cell / (6 * FACE_CELLS * FACE_CELLS) as u32
+}
+
+impl NearCells {
+    /// Empties all cells for a frame.
+    pub(super) fn clear(&mut self, view: &View) {
+        self.first_octave = first_octave(view.near);
+        self.counts.resize_with(NEAR_CELLS, AtomicU32::default);
+        self.entries.resize_with(NEAR_CELLS * SPARSE_POINTS as usize, AtomicU32::default);
+        self.counts.iter_mut().for_each(|count| *count.get_mut() = 0);
+        self.listed.clear();
+    }
+
+    /// Counts a point.
+    #[inline(always)]
+    pub(super) fn add(&self, cell: u32, point: u32) {
+        let count = &self.counts[cell as usize];
+        // Most cells are crowded: a load takes no cache line from other threads.
+        if count.load(Ordering::Relaxed) <= SPARSE_POINTS {
+            let at = count.fetch_add(1, Ordering::Relaxed);
+            if at < SPARSE_POINTS {
+                self.entries[(cell * SPARSE_POINTS + at) as usize].store(point, Ordering::Relaxed);
+            }
+        }
+    }
+
+    fn count(&self, cell: u32) -> u32 {
+        self.counts[cell as usize].load(Ordering::Relaxed)
+    }
+
+    /// Lists the points of the sparse cells; none if they are too many or fewer than `fewest`, or if no point is near.
+    /// The order of the cloud does not matter, apart from points at the same place.
+    pub(super) fn list(&mut self, cloud: &SlotTable<'_>, view: &View, fewest: usize) {
+        let mut cells = 0..NEAR_CELLS as u32;
+        self.crowded = cells.find(|&cell| self.count(cell) > SPARSE_POINTS).map_or(OCTAVES as u32, octave_of);
+        let sparse = |&cell: &u32| {
+            (1..=SPARSE_POINTS).contains(&self.count(cell)) && octave_of(cell) <= self.crowded + LISTED_OCTAVES
+        };
+        let total: usize = (0..NEAR_CELLS as u32).filter(sparse).map(|cell| self.count(cell) as usize).sum();
+        if !(fewest..=MOST_NEAR).contains(&total) {
+            return;
+        }
+        let place = |point: u32| cloud.to_view(point, view).to_array();
+        let mut listed = Vec::with_capacity(total);
+        for cell in (0..NEAR_CELLS as u32).filter(sparse) {
+            let first = listed.len();
+            let entries = &self.entries[(cell * SPARSE_POINTS) as usize..][..self.count(cell) as usize];
+            listed.extend(entries.iter().map(|entry| entry.load(Ordering::Relaxed)));
+            listed[first..].sort_unstable_by_key(|&point| (place(point).map(f32::to_bits), point));
+        }
+        if listed.iter().any(|&point| self.is_near(place(point))) {
+            self.listed = listed;
+        }
+    }
+
+    /// Whether a point at a position in view space is near.
+    pub(super) fn is_near(&self, position: [f32; 3]) -> bool {
+        let at = |position: [f32; 3]| cell(position, self.first_octave);
+        let own = at(position);
+        if self.count(own) > NEAR_POINTS || octave_of(own) > self.crowded {
+            return false;
+        }
+        let [x, y, z] = position;
+        let reach = NEAR_REACH * x.abs().max(y.abs()).max(z.abs());
+        (0..27).all(|side| {
+            let [a, b, c] = [side % 3, side / 3 % 3, side / 9].map(|step| (step as f32 - 1.0) * reach);
+            self.count(at([x + a, y + b, z + c])) <= SPARSE_POINTS
+        })
+    }
+}
+
+/// The pixel of a listed point: its own, or the one at the screen's edge in its direction.
+pub(super) fn clamped_pixel(position: [f32; 3], view: &View) -> u32 {
+    let [x, y, z] = position;
+    let depth = z.max(1e-3 * x.abs().max(y.abs()).max(z.abs())).max(f32::MIN_POSITIVE);
+    let [x, y] = view.to_pixel([x, y, depth].into());
+    // The casts saturate below.
+    let [x, y] = [(x as u32).min(view.width - 1), (y as u32).min(view.height - 1)];
+    y << 16 | x
+}
