@@ -92,6 +92,13 @@ fn a_cloud_cut_into_runs_is_the_same_to_the_byte() {
     let poison = vec![[f32::NAN; 3], [3e38, -3e38, 1.0], [0.0, f32::INFINITY, 0.0]];
     let poisoned = PointCloud::new(DVec3::ZERO, [statue.positions()[..5000].to_vec(), poison].concat());
     let few = PointCloud::new(DVec3::ZERO, statue.positions()[..3].to_vec());
+    // Points closer to a walker than a few of their distances are listed by themselves.
+    let mut random = Random::new(91);
+    let ground = (0..20_000).map(|_| [60.0 * random.signed(), 60.0 * random.signed(), 0.0]).collect();
+    let ground = PointCloud::new(DVec3::ZERO, ground);
+    let eye = DVec3::new(0.3, -0.2, 1.7);
+    let projection = Projection::PerspectiveFovDeg(60.0);
+    let walker = Camera { eye, look_at: eye + DVec3::new(10.0, 3.0, -2.0), up: DVec3::Z, projection };
     let all = [ColorMode::Auto, ColorMode::Height, ColorMode::Field("gpstime".into()), ColorMode::Classification];
     let cases = [
         (&statue, close, 4096, &all[..]),
@@ -100,6 +107,7 @@ fn a_cloud_cut_into_runs_is_the_same_to_the_byte() {
         (&herd, whole, 777, &all[..2]),
         (&poisoned, close, 100, &all[..1]),
         (&few, close, 1, &all[..1]),
+        (&ground, walker, 1300, &all[1..2]),
     ];
     for mut renderer in crate::renderers() {
         for (cloud, camera, len, colors) in &cases {
