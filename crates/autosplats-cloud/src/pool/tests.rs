@@ -1,7 +1,7 @@
 //! The pool against a map of clouds, over many insertions, removals and choices.
 
 use super::*;
-use crate::{Axes, Random, Scan};
+use crate::{Axes, Key, Random, Scan};
 
 const SLOTS: usize = 9;
 

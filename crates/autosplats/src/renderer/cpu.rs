@@ -5,12 +5,13 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::attributes::SplatAttributes;
+use super::checks::check;
 use super::exposure::Exposure;
 use super::frame::Stage;
 use super::rules::{Mode, Rules};
 use super::surfels::point_surfels;
 use super::upward::Upward;
-use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check};
+use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings};
 use crate::Error;
 use crate::adapt::{Adapter, DepthNoise, Noise};
 use crate::camera::{Camera, View};

@@ -8,11 +8,12 @@ use std::time::Instant;
 
 use self::prepared::{Passes, Prepared, ResidentBuffers, Shape};
 use super::attributes::{ColorSource, SplatAttributes};
+use super::checks::{check, check_count};
 use super::exposure::Exposure;
 use super::rules::{Mode, Rules};
 use super::surfels::point_surfels;
 use super::upward::Upward;
-use super::{Counts, Frame, PointSurfel, Settings, Timings, check, check_count};
+use super::{Counts, Frame, PointSurfel, Settings, Timings};
 use crate::Error;
 use crate::adapt::DepthNoise;
 use crate::adapt::gpu::DepthNoiseBuffer;

@@ -1,6 +1,7 @@
 //! Frames of a cloud on the CPU or a GPU.
 
 mod attributes;
+mod checks;
 mod cpu;
 mod exposure;
 mod first_radius;
@@ -20,14 +21,14 @@ use autosplats_cloud::PointCloud;
 use self::cpu::{CpuRenderer, check_engine};
 use self::gpu::GpuRenderer;
 use self::scaling::Scaling;
-use crate::camera::{Camera, View};
+use crate::Error;
+use crate::camera::Camera;
 use crate::fit::GivenPlanes;
 use crate::gpu::{AdapterSummary, Gpu, PassTime};
 use crate::normals::Normals;
 use crate::points::Points;
 use crate::shade::Image;
 use crate::splat::GBuffer;
-use crate::{Error, MAX_SIDE};
 
 pub use exposure::usual_exposure;
 pub use first_radius::{RadiusTrial, best_first_radius};
@@ -488,20 +489,4 @@ impl Renderer {
             }
         }
     }
-}
-
-/// Checks the request and prepares the camera.
-fn check(points: Points<'_>, camera: &Camera, [width, height]: [u32; 2], settings: &Settings) -> Result<View, Error> {
-    settings.check()?;
-    let sides = 1..=MAX_SIDE;
-    if !sides.contains(&width) || !sides.contains(&height) {
-        return Err(Error::ImageSize { width, height });
-    }
-    check_count(points)?;
-    camera.view(points.origin(), [width, height])
-}
-
-fn check_count(points: Points<'_>) -> Result<(), Error> {
-    // The last index marks empty pixels.
-    if points.room() >= u32::MAX as usize { Err(Error::TooManyPoints(points.room())) } else { Ok(()) }
 }
