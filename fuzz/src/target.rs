@@ -79,7 +79,8 @@ fn tree(name: &Path, bytes: &[u8]) -> Result<Option<Arc<dyn Tree>>, Error> {
 /// Describes a file. Recordings and bare messages have no description.
 pub(crate) fn describe(name: &Path, bytes: &[u8], options: &ReadOptions) -> Result<(), Error> {
     if let Some(tree) = tree(name, bytes)? {
-        describe_tree(&*tree);
+        let described = describe_tree(&*tree);
+        assert!(described.points.is_some(), "a tree states its points");
         return Ok(());
     }
     if is_recording(name) || message(name).is_some() { Ok(()) } else { describe_bytes(name, bytes, options).map(drop) }

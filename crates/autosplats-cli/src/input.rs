@@ -237,6 +237,17 @@ impl Inputs {
         if is_near && points < MIN_TREE_POINTS && !always {
             return Ok(None);
         }
+        let corners = |placed: &PlacedTree| {
+            let [low, high] = placed.tree.info().bounds;
+            let corner = |at: usize| {
+                let [x, y, z] = [0, 1, 2].map(|axis| if at >> axis & 1 == 0 { low[axis] } else { high[axis] });
+                placed.world_from_tree.transform_point3(DVec3::new(x, y, z))
+            };
+            let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+            (0..8).map(corner).fold(none, |[low, high], at| [low.min(at), high.max(at)])
+        };
+        let boxes: Vec<[DVec3; 2]> = trees.iter().map(corners).collect();
+        note_distant_inputs(&boxes, |at, note| console.note(format_args!("{}: {note}", self.list[at].name)));
         Ok(Some(trees))
     }
 
@@ -358,7 +369,10 @@ impl Inputs {
         let filled = clouds.into_iter().zip(parts).filter_map(|(cloud, part)| Some((cloud?, part)));
         let (clouds, parts): (Vec<_>, Vec<_>) = filled.unzip();
         note_differences(&clouds, &parts);
-        note_distant_inputs(&clouds, &parts);
+        if clouds.len() > 1 {
+            let boxes: Vec<[DVec3; 2]> = clouds.par_iter().map(world_box).collect();
+            note_distant_inputs(&boxes, |at, note| parts[at].note(note));
+        }
         Ok(PointCloud::merge(clouds))
     }
 }
@@ -402,12 +416,11 @@ fn note_differences(clouds: &[(PointCloud, DMat4)], parts: &[InputProgress<'_>])
     }
 }
 
-/// Notes the inputs that lie too far from all others to be seen in one picture.
-fn note_distant_inputs(clouds: &[(PointCloud, DMat4)], parts: &[InputProgress<'_>]) {
-    if clouds.len() < 2 {
+/// Notes the inputs that lie too far from all others to be seen in one picture. Takes the box of each in the world.
+fn note_distant_inputs(boxes: &[[DVec3; 2]], note: impl Fn(usize, &str)) {
+    if boxes.len() < 2 {
         return;
     }
-    let boxes: Vec<[DVec3; 2]> = clouds.par_iter().map(world_box).collect();
     // Gap between two boxes, in diagonals of the larger one.
     let apart = |[low, high]: [DVec3; 2], [other_low, other_high]: [DVec3; 2]| {
         let gap = (other_low - high).max(low - other_high).max(DVec3::ZERO).length();
@@ -425,9 +438,12 @@ fn note_distant_inputs(clouds: &[(PointCloud, DMat4)], parts: &[InputProgress<'_
         far.remove(0);
     }
     for (at, apart) in far {
-        parts[at].note(&format!(
-            "lies {apart:.0} times the inputs' size away from the others; a picture hardly shows both; move it with --pose"
-        ));
+        note(
+            at,
+            &format!(
+                "lies {apart:.0} times the inputs' size away from the others; a picture hardly shows both; move it with --pose"
+            ),
+        );
     }
 }
 

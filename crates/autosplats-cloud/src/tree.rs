@@ -182,9 +182,11 @@ pub trait Tree: Send + Sync + fmt::Debug {
     /// Those of reading.
     fn fetch(&self, keys: &[Key], progress: &dyn Progress) -> Result<Vec<Vec<u8>>, Error>;
 
-    /// Decodes the stored bytes of a node. Values that are zero at every point of the node are left out: a missing field
-    /// is 0 there, and missing colours are black. The first node with colours that is decoded settles whether colours
-    /// have 8 or 16 bits, for which the root may be read.
+    /// Decodes the stored bytes of a node.
+    ///
+    /// Values that are zero at every point of the node are left out: a missing field is 0 there, and missing colours
+    /// are black. The first points of the scan that have colours settle whether all colours have 8 or 16 bits. The
+    /// first call that wants colours may read the root for that.
     ///
     /// # Errors
     /// [`Error::Malformed`] if the bytes are damaged.

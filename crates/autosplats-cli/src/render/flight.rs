@@ -22,9 +22,9 @@ enum Still {
 }
 
 impl Still {
-    fn open(job: &Job, trees: Option<Vec<PlacedTree>>, notes: &Notes<'_>) -> Result<Self, Failure> {
+    fn open(job: &Job, trees: Option<Vec<PlacedTree>>, bar: &Bar, notes: &Notes<'_>) -> Result<Self, Failure> {
         match trees {
-            Some(trees) => Ok(Self::Trees(Box::new(scan::open(job, trees, notes)?))),
+            Some(trees) => Ok(Self::Trees(Box::new(scan::open(job, trees, bar)?))),
             None => {
                 let mut cloud = job.inputs.read(&job.console)?;
                 if cloud.to_local_metres() {
@@ -96,7 +96,7 @@ pub(super) fn run(
     let bar = Bar::new(&format!("rendering {} frames", frames.len()), &job.console);
     let names = job.inputs.names();
     let notes = Notes::new(&bar, &names);
-    let still = Still::open(&job, scan::trees(&job)?, &notes)?;
+    let still = Still::open(&job, scan::trees(&job)?, &bar, &notes)?;
     let (_, axes) = job.camera.place(still.sample(), None, job.size)?;
     let mut still = still.with_axes(axes);
     job.settle_exposure(still.sample());

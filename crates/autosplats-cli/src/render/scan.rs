@@ -38,7 +38,7 @@ pub(super) fn run(
     let bar = Bar::new(&format!("reading {}", job.inputs.names()), &job.console);
     let names = job.inputs.names();
     let notes = Notes::new(&bar, &names);
-    let scene = open(&job, trees, &notes)?;
+    let scene = open(&job, trees, &bar)?;
     let (camera, axes) = job.camera.place(scene.sample(), None, job.size)?;
     let mut scene = scene.with_axes(axes);
     job.settle_exposure(scene.sample());
@@ -57,9 +57,10 @@ pub(super) fn detail(job: &Job) -> Detail {
 }
 
 /// Opens the trees and reads the coarsest points, with the attributes that the picture shows.
-pub(super) fn open(job: &Job, trees: Vec<PlacedTree>, notes: &Notes<'_>) -> Result<TreeScene, Failure> {
+pub(super) fn open(job: &Job, trees: Vec<PlacedTree>, bar: &Bar) -> Result<TreeScene, Failure> {
     for placed in &trees {
         let info = placed.tree.info();
+        let notes = Notes::new(bar, &placed.tree.name().display().to_string());
         info.notes.iter().for_each(|note| notes.note(note));
         if info.crs.unit == Some(Unit::Degree) {
             let why =
@@ -84,7 +85,7 @@ pub(super) fn open(job: &Job, trees: Vec<PlacedTree>, notes: &Notes<'_>) -> Resu
         keep: job.inputs.kept(),
         ..Wanted::default()
     };
-    let scene = TreeScene::open(trees, wanted, memory(job)?, notes)?;
+    let scene = TreeScene::open(trees, wanted, memory(job)?, bar)?;
     job.check_color(scene.sample())?;
     Ok(scene)
 }

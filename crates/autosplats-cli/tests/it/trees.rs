@@ -128,7 +128,7 @@ fn parts_are_converted_without_the_rest() {
     folder.succeed(&["convert", &near, "coarse.ply", "--spacing", "1e9"]);
     let root = count("coarse.ply").0;
     assert!(root > 10_000 && root < 60_000, "the root alone: {root}");
-    folder.fail(&["convert", "whole.ply", "b.ply", "--spacing", "1"], 4, &["whole.ply", "no octree", "--voxel"]);
+    folder.fail(&["convert", "whole.ply", "b.ply", "--spacing", "1"], 3, &["whole.ply", "no octree", "--voxel"]);
     let beside = "1e7,1e7,1e7,2e7,2e7,2e7";
     folder.fail(&["convert", &near, "b.ply", "--bounds", beside], 3, &["none of the 341989 points", "--bounds"]);
     folder.succeed(&["normals", &far, "n.ply", "--bounds", &bounds]);

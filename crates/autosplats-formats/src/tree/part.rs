@@ -33,8 +33,8 @@ pub struct Part {
 /// Damaged nodes are left out, which is noted, and so is what the tree finds odd.
 ///
 /// # Errors
-/// Those of reading; [`Error::Malformed`] if no node can be decoded; [`Error::NothingKept`]; [`Error::OutOfMemory`]; and
-/// [`Error::Cancelled`] if `progress` says so.
+/// Those of reading; [`Error::Malformed`] if no node can be decoded; [`Error::NothingKept`]; [`Error::OutOfMemory`];
+/// and [`Error::Cancelled`] if `progress` says so.
 pub fn read_part(tree: &dyn Tree, part: &Part, wanted: &Wanted, progress: &dyn Progress) -> Result<PointCloud, Error> {
     progress.tick(0.0)?;
     let info = tree.info();

@@ -10,8 +10,8 @@ pub(super) struct Found {
     pub(super) bytes: u64,
 }
 
-/// The nodes for which `wants` is true, and whose parents are among them, in the order of their keys. Pages that tell of
-/// them are loaded if there is a `loading` to follow that. The second result is the number of pages that are not loaded.
+/// The nodes for which `wants` is true, and whose parents are among them, in the order of their keys. Pages that tell
+/// of them are loaded if there is a `loading` to follow that. The second result is the number of pages that are not.
 pub(super) fn walk(
     tree: &dyn Tree,
     wants: impl Fn(Key) -> bool,

@@ -171,10 +171,11 @@ fn pages_are_loaded_when_they_are_asked_for() {
 
 #[test]
 fn hostile_hierarchies_are_refused_in_one_line() {
+    type Change<'a> = &'a dyn Fn(&mut Vec<Entry>);
     let (sound, entries) = copc(&nodes(5000));
     let (root, child) = (entries[0], entries[1]);
     let size = sound.len() as u64;
-    let case = |change: &dyn Fn(&mut Vec<Entry>)| {
+    let case = |change: Change<'_>| {
         let (mut list, mut bytes) = (entries.clone(), sound.clone());
         change(&mut list);
         with_page(&mut bytes, &list);
@@ -184,7 +185,7 @@ fn hostile_hierarchies_are_refused_in_one_line() {
         }
     };
     let page = |key: [i32; 4], offset: u64, bytes: i32| Entry { key, offset, bytes, points: -1 };
-    let cases: &[(&str, &dyn Fn(&mut Vec<Entry>))] = &[
+    let cases: &[(&str, Change<'_>)] = &[
         ("accepted", &|_| ()),
         ("accepted", &|list| list[0] = Entry { points: 0, offset: u64::MAX, bytes: -7, ..root }),
         ("is not made of entries", &|list| list.clear()),

@@ -60,7 +60,8 @@ impl TreeScene {
     /// Those of reading; [`Error::NothingVisible`] if there are no points; an error of the kind
     /// [`Memory`](autosplats_cloud::ErrorKind::Memory) if the memory is not there.
     pub fn open(trees: Vec<PlacedTree>, wanted: Wanted, memory: u64, progress: &dyn Progress) -> Result<Self, Error> {
-        let sample = sample(&trees, &wanted, progress)?;
+        let first = coarsest(&trees, &wanted, progress)?;
+        let sample = sample(&trees, &first);
         if !sample.has_finite(1) {
             return Err(Error::NothingVisible("the coarsest points have no finite coordinates".into()));
         }
@@ -68,7 +69,11 @@ impl TreeScene {
         let fits = memory / PointPool::bytes_per_point(&sample) as u64;
         // Every picture may use half of it, and no picture uses more than all points, in slots half full.
         let capacity = fits.min(4 * stated + 64 * SLOT_POINTS as u64).min(u64::from(u32::MAX) - 1);
-        let pool = PointPool::new(&sample, capacity as usize)?;
+        let mut pool = PointPool::new(&sample, capacity as usize)?;
+        for (node, cloud) in &first {
+            // What does not fit is loaded again when it is needed.
+            pool.insert(*node, cloud);
+        }
         Ok(Self { trees, wanted, pool })
     }
 
@@ -156,22 +161,20 @@ impl TreeScene {
     }
 }
 
-/// The points of the roots and of their children, with the columns that any of them has.
-fn sample(trees: &[PlacedTree], wanted: &Wanted, progress: &dyn Progress) -> Result<PointCloud, Error> {
-    let first = || std::iter::once(Key::ROOT).chain(Key::ROOT.children());
+/// The roots and their children, with the columns that any of the trees has.
+fn coarsest(
+    trees: &[PlacedTree],
+    wanted: &Wanted,
+    progress: &dyn Progress,
+) -> Result<Vec<(NodeKey, PointCloud)>, Error> {
     let mut nodes = Vec::new();
     for (tree, placed) in trees.iter().enumerate() {
-        let keys: Vec<Key> = first().collect();
+        let keys: Vec<Key> = std::iter::once(Key::ROOT).chain(Key::ROOT.children()).collect();
         placed.tree.load_pages(&keys[..1], progress)?;
         placed.tree.load_pages(&keys[1..], progress)?;
         let known = keys.into_iter().filter(|&key| matches!(placed.tree.node(key), Node::Known { points: 1.., .. }));
         nodes.extend(known.map(|key| NodeKey { key, tree: tree as u32 }));
     }
-    let mut parts = Vec::new();
-    load_nodes(trees, &nodes, wanted, progress, |points| {
-        parts.push(points.cloud);
-        Ok(())
-    })?;
     let mut columns = PointCloud::new(DVec3::ZERO, Vec::new());
     let infos = || trees.iter().map(|placed| placed.tree.info());
     if wanted.colors && infos().any(|info| info.colors) {
@@ -182,16 +185,30 @@ fn sample(trees: &[PlacedTree], wanted: &Wanted, progress: &dyn Progress) -> Res
             columns = columns.with_field(field, FieldValues::U8(Vec::new()))?;
         }
     }
-    let parts = parts.into_iter().map(|part| (completed(part, &columns), DMat4::IDENTITY)).collect();
-    let sample = PointCloud::merge(parts);
+    let mut first = Vec::new();
+    load_nodes(trees, &nodes, wanted, progress, |NodePoints { node, cloud, damage }| {
+        // A damaged node is told of when a picture needs it.
+        if damage.is_none() {
+            first.push((node, completed(cloud, &columns)));
+        }
+        Ok(())
+    })?;
+    Ok(first)
+}
+
+/// Points that stand for all of the trees.
+fn sample(trees: &[PlacedTree], first: &[(NodeKey, PointCloud)]) -> PointCloud {
+    let parts: Vec<_> = first.iter().map(|(_, cloud)| (cloud, DMat4::IDENTITY)).collect();
+    let sample = PointCloud::merged(&parts);
     // Poses may turn what the files state.
+    let infos = || trees.iter().map(|placed| placed.tree.info());
     let axes = infos().next().and_then(|info| info.axes);
     let agree =
         infos().all(|info| info.axes == axes) && trees.iter().all(|placed| placed.world_from_tree == DMat4::IDENTITY);
-    Ok(match axes.filter(|_| agree) {
+    match axes.filter(|_| agree) {
         Some(axes) => sample.with_axes(axes),
         None => sample,
-    })
+    }
 }
 
 /// A node with all columns of `like`. A tree leaves out what is zero at every point of a node.

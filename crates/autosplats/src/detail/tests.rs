@@ -8,7 +8,7 @@ use autosplats_cloud::{
 use glam::{DMat4, DVec3};
 
 use super::*;
-use crate::{Camera, Error, Projection};
+use crate::{Camera, Error, Projection, Renderer, Settings};
 
 /// Most points of a leaf.
 const LEAF_POINTS: usize = 500;
@@ -326,4 +326,64 @@ fn loading_ends_at_once() {
     assert!(load_nodes(&trees, &[], &wanted, &(), |_| Ok(())).is_ok(), "nothing to do");
     let wrong = Detail { spacing_px: f64::NAN, ..Detail::default() };
     assert!(matches!(choose(&trees, &camera(2.0), [9, 9], &wrong), Err(Error::Setting { .. })), "no number");
+}
+
+fn scene(tree: MemoryTree, memory: u64) -> TreeScene {
+    TreeScene::open(vec![placed(tree)], Wanted::default(), memory, &()).expect("a scene")
+}
+
+#[test]
+fn a_picture_does_not_depend_on_the_pictures_before() {
+    let size = [160, 120];
+    let views = [camera(3.0), camera(1.4), Camera { eye: DVec3::new(2.0, 0.5, 1.0), ..camera(3.0) }];
+    let wanted = Detail { spacing_px: 1.5, ..Detail::default() };
+    // Memory for a part of the points: nodes have to leave.
+    let memory = 12 * 120_000;
+    let picture = |scene: &mut TreeScene, camera: &Camera| {
+        let shown = scene.show(camera, size, &wanted, &()).expect("points");
+        assert_eq!(scene.points().chosen_points() as u64, shown.points, "all that is chosen is there");
+        let mut renderer = Renderer::new();
+        let frame = renderer.render(scene.points(), camera, size, &Settings::default()).expect("a picture");
+        (shown.nodes, shown.points, frame.image.pixels.clone())
+    };
+    let mut flown = scene(MemoryTree::new(sphere(300_000)), memory);
+    for number in [0, 1, 2, 1, 0, 2] {
+        let mut fresh = scene(MemoryTree::new(sphere(300_000)), memory);
+        let (camera, all) = (&views[number], picture(&mut flown, &views[number]));
+        assert!(picture(&mut fresh, camera) == all, "view {number} differs after others");
+        assert!(all.0 > 10, "{} nodes", all.0);
+    }
+    let again = flown.show(&views[2], size, &wanted, &()).expect("points");
+    assert_eq!(again.loaded, 0, "what is there is not loaded again");
+}
+
+#[test]
+fn memory_limits_what_is_chosen() {
+    let detail = Detail { spacing_px: 0.3, ..Detail::default() };
+    let mut before = f64::INFINITY;
+    for memory in [12 * 200_000, 12 * 600_000, 12 * 3_000_000] {
+        let mut scene = scene(MemoryTree::new(sphere(200_000)), memory);
+        let shown = scene.show(&camera(2.0), [600, 400], &detail, &()).expect("points");
+        assert!(scene.points().capacity() as u64 * 12 <= memory, "the pool keeps to {memory} bytes");
+        assert!(shown.spacing_px < before, "more memory shows more: {} pixels after {before}", shown.spacing_px);
+        before = shown.spacing_px;
+    }
+    assert!(before <= 0.3, "enough is enough: {before}");
+}
+
+#[test]
+fn damage_is_told_and_the_rest_is_shown() {
+    let mut tree = MemoryTree::new(sphere(50_000));
+    let key = *tree.nodes.keys().find(|key| key.level == 2).expect("a node");
+    let lost = tree.nodes[&key].len() as u64;
+    tree.damaged = Some(key);
+    let mut scene = scene(tree, 12 * 1_000_000);
+    let all = Camera { projection: Projection::OrthographicHeight(8.0), ..camera(5.0) };
+    let shown = scene.show(&all, [3000, 3000], &detail(0.01), &()).expect("points");
+    assert_eq!(shown.damaged, [1, lost]);
+    assert!(shown.damage.as_ref().is_some_and(|damage| damage.contains("it is damaged")), "{shown:?}");
+    assert_eq!(scene.points().chosen_points(), 50_000 - lost as usize);
+    let empty = MemoryTree::new(PointCloud::new(DVec3::ZERO, Vec::new()));
+    let opened = TreeScene::open(vec![placed(empty)], Wanted::default(), 1 << 20, &());
+    assert!(matches!(opened, Err(Error::NothingVisible(_))), "no points");
 }

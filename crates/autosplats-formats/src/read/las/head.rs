@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use autosplats_cloud::{Crs, Error, PointCloud, guard};
+use autosplats_cloud::{Crs, Error, guard};
 use glam::DVec3;
 
 use super::{
@@ -14,22 +14,12 @@ use super::{
     header::Header,
     laz::Layout,
     records::Records,
-    shape::Shape,
+    shape::{Decoded, Shape},
 };
 use crate::{
-    color_scale::Levels,
     las,
     read::{Description, ReadOptions, units},
 };
-
-/// Points that were decoded, with the colours found.
-pub(crate) struct Decoded {
-    pub(crate) cloud: PointCloud,
-    /// How many colour values lie where.
-    pub(crate) levels: Levels,
-    /// Number of further points that are stated but cannot be decoded.
-    pub(crate) lost: u64,
-}
 
 /// Header and records of a compressed file in layers.
 pub(crate) struct Head {

@@ -28,8 +28,8 @@ mod slices;
 pub(crate) use self::{
     chunks::MAX_RATIO,
     columns::{Colors, narrow_note},
-    head::{Decoded, Head},
-    shape::{Shape, read_shaped},
+    head::Head,
+    shape::{Decoded, Shape, read_shaped},
 };
 
 use autosplats_cloud::{Contents, Error, Unit, degree_origin, sampled_middle};

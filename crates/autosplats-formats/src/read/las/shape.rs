@@ -2,21 +2,31 @@
 
 use std::path::Path;
 
-use autosplats_cloud::{Error, Wanted};
+use autosplats_cloud::{Error, PointCloud, Wanted};
 use glam::DVec3;
 use laz::DecompressionSelection;
 
 use super::{
-    Decoded, Job,
+    Job,
     columns::Colors,
     dimension::{Dimension, Source},
     header::Header,
     points,
 };
 use crate::{
+    color_scale::Levels,
     las::{self, Place},
     read::ReadOptions,
 };
+
+/// Points that were decoded, with the colours found.
+pub(crate) struct Decoded {
+    pub(crate) cloud: PointCloud,
+    /// How many colour values lie where.
+    pub(crate) levels: Levels,
+    /// Number of further points that are stated but cannot be decoded.
+    pub(crate) lost: u64,
+}
 
 /// What is taken of the points, and how, where other parts of the same scan tell. The default takes everything.
 #[derive(Default)]

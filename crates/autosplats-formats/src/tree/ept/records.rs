@@ -19,8 +19,8 @@ use crate::{
 /// Evaluates `$body` with `$type` as the number type of a column.
 macro_rules! each_scalar {
     ($scalar:expr, $variant:ident, $type:ident => $body:expr) => {
-        each_scalar!(@ $scalar, $variant, $type => $body; I8 i8, U8 u8, I16 i16, U16 u16, I32 i32, U32 u32, I64 i64, U64 u64,
-            F32 f32, F64 f64)
+        each_scalar!(@ $scalar, $variant, $type => $body; I8 i8, U8 u8, I16 i16, U16 u16, I32 i32, U32 u32,
+            I64 i64, U64 u64, F32 f32, F64 f64)
     };
     (@ $scalar:expr, $variant:ident, $type:ident => $body:expr; $($name:ident $number:ty),*) => {
         match $scalar {
@@ -119,5 +119,7 @@ fn values(records: &[u8], stride: usize, column: &Column) -> FieldValues {
     if column.scaled.is_some() {
         return FieldValues::F64(rows.map(|row| number(row, column)).collect());
     }
-    each_scalar!(column.scalar, variant, T => variant(rows.map(|row| T::from_le_bytes(bytes_at(row, column.at))).collect()))
+    each_scalar!(column.scalar, variant, T => {
+        variant(rows.map(|row| T::from_le_bytes(bytes_at(row, column.at))).collect())
+    })
 }
