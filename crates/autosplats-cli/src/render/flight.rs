@@ -17,7 +17,7 @@ use crate::progress::{Bar, Notes};
 
 /// Points that do not move.
 enum Still {
-    Whole(PointCloud),
+    Whole(Box<PointCloud>),
     Trees(Box<TreeScene>),
 }
 
@@ -32,7 +32,7 @@ impl Still {
                 }
                 job.check_color(&cloud)?;
                 job.check_count(&cloud)?;
-                Ok(Self::Whole(cloud))
+                Ok(Self::Whole(Box::new(cloud)))
             }
         }
     }
@@ -47,7 +47,7 @@ impl Still {
 
     fn with_axes(self, axes: autosplats_cloud::Axes) -> Self {
         match self {
-            Self::Whole(cloud) => Self::Whole(cloud.with_axes(axes)),
+            Self::Whole(cloud) => Self::Whole(Box::new(cloud.with_axes(axes))),
             Self::Trees(scene) => Self::Trees(Box::new(scene.with_axes(axes))),
         }
     }
@@ -63,7 +63,7 @@ impl Still {
 
     fn points(&self) -> Points<'_> {
         match self {
-            Self::Whole(cloud) => cloud.into(),
+            Self::Whole(cloud) => (&**cloud).into(),
             Self::Trees(scene) => scene.points().into(),
         }
     }

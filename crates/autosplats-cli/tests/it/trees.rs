@@ -42,7 +42,7 @@ fn a_picture_needs_a_part_of_the_points_and_looks_like_all() {
         let report = report(&folder, &[&[&lion, "-o", &name, "--detail", detail], &camera[..]].concat());
         let tree = &report["tree"];
         assert_eq!(tree["stored_points"], 341_989);
-        assert!(tree["spacing_px"].as_f64().is_some_and(|px| px <= detail.parse().expect("a number")), "{tree}");
+        assert!(tree["spacing_px"].as_f64().is_some_and(|px| px <= detail.parse::<f64>().expect("a number")), "{tree}");
         assert_eq!(report["counts"]["points"], tree["points"], "all that is loaded is drawn");
         points.push(tree["points"].as_u64().expect("a number"));
         let off = difference(&folder, "whole.png", &name);

@@ -70,8 +70,14 @@ fn real_files_are_what_others_say() {
     }
 }
 
-const EXACT: ReadOptions =
-    ReadOptions { exact: true, keep_no_returns: false, columns: None, keep: None, depth_camera: None };
+const EXACT: ReadOptions = ReadOptions {
+    exact: true,
+    keep_no_returns: false,
+    columns: None,
+    keep: None,
+    headers: Vec::new(),
+    depth_camera: None,
+};
 
 /// Writes a cloud and reads it back. Also returns the notes of writing.
 fn round_trip(cloud: &PointCloud, options: &ReadOptions) -> (PointCloud, Vec<String>) {
