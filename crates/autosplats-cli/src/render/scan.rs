@@ -85,7 +85,7 @@ pub(super) fn open(job: &Job, trees: Vec<PlacedTree>, bar: &Bar) -> Result<TreeS
         keep: job.inputs.kept(),
         ..Wanted::default()
     };
-    let scene = TreeScene::open(trees, wanted, memory(job)?, bar)?;
+    let scene = TreeScene::open(trees, wanted, memory(job)?, job.tree.points_budget, bar)?;
     job.check_color(scene.sample())?;
     Ok(scene)
 }

@@ -37,7 +37,7 @@ fn a_picture_needs_a_part_of_the_points_and_looks_like_all() {
     assert!(whole.get("tree").is_none(), "few points are read whole: {whole}");
     let camera = ["--camera", "cam.json"];
     let mut points = Vec::new();
-    for (detail, most) in [("4", 12.0), ("1", 5.0), ("0.2", 1.5)] {
+    for (detail, most) in [("4", 16.0), ("1", 5.0), ("0.2", 4.0)] {
         let name = format!("{detail}.png");
         let report = report(&folder, &[&[&lion, "-o", &name, "--detail", detail], &camera[..]].concat());
         let tree = &report["tree"];

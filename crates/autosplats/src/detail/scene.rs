@@ -9,6 +9,9 @@ use super::{Choice, Detail, NodePoints, PlacedTree, choose_loading, load_nodes};
 use crate::Error;
 use crate::camera::Camera;
 
+/// Slots beyond those that are needed.
+const SPARE_SLOTS: u64 = 16;
+
 /// Trees, of which the nodes of the last pictures are in memory.
 ///
 /// ```no_run
@@ -20,7 +23,7 @@ use crate::camera::Camera;
 /// # fn picture(tree: Arc<dyn Tree>) -> Result<(), autosplats::Error> {
 /// let trees = vec![PlacedTree { tree, world_from_tree: DMat4::IDENTITY }];
 /// let wanted = Wanted { colors: true, fields: Some(Vec::new()), ..Wanted::default() };
-/// let mut scene = TreeScene::open(trees, wanted, 500 << 20, &())?;
+/// let mut scene = TreeScene::open(trees, wanted, 500 << 20, 10_000_000, &())?;
 /// let (axes, projection) = (guess_axes(scene.sample()), Projection::PerspectiveFovDeg(40.0));
 /// let camera = Camera::fit(scene.sample(), axes, ViewDirection::Auto, 16.0 / 9.0, projection)?;
 /// let shown = scene.show(&camera, [1920, 1080], &Detail::default(), &())?;
@@ -54,7 +57,8 @@ pub struct Shown {
 }
 
 impl TreeScene {
-    /// Reads the coarsest points of trees, and reserves up to `memory` bytes for the points of pictures.
+    /// Reads the coarsest points of trees, and reserves up to `memory` bytes for the points of pictures, which have at
+    /// most `max_points` each.
     ///
     /// # Errors
     /// Those of reading; [`Error::NothingVisible`] if there are no points; an error of the kind
@@ -65,10 +69,12 @@ impl TreeScene {
         if !sample.has_finite(1) {
             return Err(Error::NothingVisible("the coarsest points have no finite coordinates".into()));
         }
-        let stated: u64 = trees.iter().map(|placed| placed.tree.info().points).sum();
-        let fits = memory / PointPool::bytes_per_point(&sample) as u64;
-        // Every picture may use half of it, and no picture uses more than all points, in slots half full.
-        let capacity = fits.min(4 * stated + 64 * SLOT_POINTS as u64).min(u64::from(u32::MAX) - 1);
+        let fits = memory / PointPool::bytes_per_point(&sample) as u64 / SLOT_POINTS as u64;
+        // Every picture may use half of the slots. A quarter of them may be lost by nodes that fill none.
+        let needed = (max_points as u64).div_ceil(SLOT_POINTS as u64).saturating_mul(5) / 2 + SPARE_SLOTS;
+        let all = slots_of_all(&trees).map_or(u64::MAX, |slots| 2 * slots + SPARE_SLOTS);
+        let most = u64::from(u32::MAX) / SLOT_POINTS as u64 - 1;
+        let capacity = fits.min(needed).min(all).min(most) * SLOT_POINTS as u64;
         let mut pool = PointPool::new(&sample, capacity as usize)?;
         for (node, cloud) in &first {
             // What does not fit is loaded again when it is needed.
@@ -159,6 +165,25 @@ impl TreeScene {
             bytes: sum.bytes + one.bytes,
         })
     }
+}
+
+/// Slots that all nodes take; `None` if not all are known, as in large trees.
+fn slots_of_all(trees: &[PlacedTree]) -> Option<u64> {
+    let mut slots = 0;
+    for placed in trees {
+        let mut keys = vec![Key::ROOT];
+        while let Some(key) = keys.pop() {
+            match placed.tree.node(key) {
+                Node::Absent => {}
+                Node::Unknown => return None,
+                Node::Known { points, .. } => {
+                    slots += u64::from(points).div_ceil(SLOT_POINTS as u64);
+                    keys.extend(key.children());
+                }
+            }
+        }
+    }
+    Some(slots)
 }
 
 /// The roots and their children, with the columns that any of the trees has.

@@ -329,7 +329,7 @@ fn loading_ends_at_once() {
 }
 
 fn scene(tree: MemoryTree, memory: u64) -> TreeScene {
-    TreeScene::open(vec![placed(tree)], Wanted::default(), memory, &()).expect("a scene")
+    TreeScene::open(vec![placed(tree)], Wanted::default(), memory, 10_000_000, &()).expect("a scene")
 }
 
 #[test]
@@ -338,7 +338,7 @@ fn a_picture_does_not_depend_on_the_pictures_before() {
     let views = [camera(3.0), camera(1.4), Camera { eye: DVec3::new(2.0, 0.5, 1.0), ..camera(3.0) }];
     let wanted = Detail { spacing_px: 1.5, ..Detail::default() };
     // Memory for a part of the points: nodes have to leave.
-    let memory = 12 * 120_000;
+    let memory = 12 * 600_000;
     let picture = |scene: &mut TreeScene, camera: &Camera| {
         let shown = scene.show(camera, size, &wanted, &()).expect("points");
         assert_eq!(scene.points().chosen_points() as u64, shown.points, "all that is chosen is there");
@@ -361,7 +361,7 @@ fn a_picture_does_not_depend_on_the_pictures_before() {
 fn memory_limits_what_is_chosen() {
     let detail = Detail { spacing_px: 0.3, ..Detail::default() };
     let mut before = f64::INFINITY;
-    for memory in [12 * 200_000, 12 * 600_000, 12 * 3_000_000] {
+    for memory in [12 * 200_000, 12 * 600_000, 12 * 30_000_000] {
         let mut scene = scene(MemoryTree::new(sphere(200_000)), memory);
         let shown = scene.show(&camera(2.0), [600, 400], &detail, &()).expect("points");
         assert!(scene.points().capacity() as u64 * 12 <= memory, "the pool keeps to {memory} bytes");
@@ -377,13 +377,13 @@ fn damage_is_told_and_the_rest_is_shown() {
     let key = *tree.nodes.keys().find(|key| key.level == 2).expect("a node");
     let lost = tree.nodes[&key].len() as u64;
     tree.damaged = Some(key);
-    let mut scene = scene(tree, 12 * 1_000_000);
+    let mut scene = scene(tree, 12 * 30_000_000);
     let all = Camera { projection: Projection::OrthographicHeight(8.0), ..camera(5.0) };
     let shown = scene.show(&all, [3000, 3000], &detail(0.01), &()).expect("points");
     assert_eq!(shown.damaged, [1, lost]);
     assert!(shown.damage.as_ref().is_some_and(|damage| damage.contains("it is damaged")), "{shown:?}");
     assert_eq!(scene.points().chosen_points(), 50_000 - lost as usize);
     let empty = MemoryTree::new(PointCloud::new(DVec3::ZERO, Vec::new()));
-    let opened = TreeScene::open(vec![placed(empty)], Wanted::default(), 1 << 20, &());
+    let opened = TreeScene::open(vec![placed(empty)], Wanted::default(), 1 << 20, 1000, &());
     assert!(matches!(opened, Err(Error::NothingVisible(_))), "no points");
 }
