@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn views_are_met_and_nothing_jumps() {
-        let eyes = [[0.0, 0.0, 9.0], [4.0, 1.0, 9.0], [6.0, 5.0, 3.0], [6.0, 9.0, 2.0]].map(DVec3::from);
+        let eyes = [[0.0, -3.0, 9.0], [4.0, 1.0, 9.0], [6.0, 5.0, 3.0], [6.0, 9.0, 2.0]].map(DVec3::from);
         let eyes = eyes.map(|eye| eye + DVec3::new(5e5, 5e6, 0.0));
         let path = path(&eyes);
         for (number, eye) in eyes.into_iter().enumerate() {

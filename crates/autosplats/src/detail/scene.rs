@@ -63,7 +63,13 @@ impl TreeScene {
     /// # Errors
     /// Those of reading; [`Error::NothingVisible`] if there are no points; an error of the kind
     /// [`Memory`](autosplats_cloud::ErrorKind::Memory) if the memory is not there.
-    pub fn open(trees: Vec<PlacedTree>, wanted: Wanted, memory: u64, progress: &dyn Progress) -> Result<Self, Error> {
+    pub fn open(
+        trees: Vec<PlacedTree>,
+        wanted: Wanted,
+        memory: u64,
+        max_points: usize,
+        progress: &dyn Progress,
+    ) -> Result<Self, Error> {
         let first = coarsest(&trees, &wanted, progress)?;
         let sample = sample(&trees, &first);
         if !sample.has_finite(1) {
