@@ -185,19 +185,23 @@ fn project_chunk<const NEAR: bool>(
     near: &NearCells,
 ) -> Dropped {
     let mut dropped = Dropped::default();
-    let mut slot = [0u32; LANES];
-    let mut depth = [0f32; LANES];
-    let mut part = [0u32; LANES];
-    let mut around = [0u32; LANES];
+    let [mut x, mut y, mut z] = [[0f32; LANES]; 3];
+    let [mut slot, mut part, mut around] = [[0u32; LANES]; 3];
     for (group, positions) in positions.chunks(LANES).enumerate() {
         if let Ok(positions) = <&[[f32; 3]; LANES]>::try_from(positions) {
             for lane in 0..LANES {
-                (slot[lane], depth[lane], part[lane], around[lane]) =
-                    project_point::<NEAR>(positions[lane], view, halves);
+                ([x[lane], y[lane], z[lane]], slot[lane], part[lane]) = project_point(positions[lane], view, halves);
             }
         } else {
             for (lane, &position) in positions.iter().enumerate() {
-                (slot[lane], depth[lane], part[lane], around[lane]) = project_point::<NEAR>(position, view, halves);
+                ([x[lane], y[lane], z[lane]], slot[lane], part[lane]) = project_point(position, view, halves);
+            }
+        }
+        if NEAR {
+            // In a loop of its own: one loop for all needs more vectors than there are registers.
+            let first_octave = first_octave(view.near);
+            for lane in 0..LANES {
+                around[lane] = cell([x[lane], y[lane], z[lane]], first_octave);
             }
         }
         // Load all lanes first: plain loads wait for memory together, while atomic writes keep later loads waiting.
@@ -219,7 +223,7 @@ fn project_chunk<const NEAR: bool>(
                 OUTSIDE => dropped.outside += 1,
                 slot => {
                     let index = first + (group * LANES + lane) as u32;
-                    let key = u64::from(depth[lane].to_bits()) << 32 | u64::from(index);
+                    let key = u64::from(z[lane].to_bits()) << 32 | u64::from(index);
                     // Most points lose in a marked sixteenth: without a write they take no cache line from other
                     // threads.
                     if key < before[lane] {
@@ -235,9 +239,9 @@ fn project_chunk<const NEAR: bool>(
     dropped
 }
 
-/// Slot and depth of a point, its sixteenth within the pixel and, if `NEAR`, its cell around the eye, without branches.
+/// Position of a point in view space, its slot and its sixteenth within the pixel, without branches.
 #[inline(always)]
-fn project_point<const NEAR: bool>(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u32, u32) {
+fn project_point(position: [f32; 3], view: &View, halves: bool) -> ([f32; 3], u32, u32) {
     let [x, y, z] = view.to_view(position).to_array();
     let [px, py] = view.to_pixel(Vec3::new(x, y, z));
     // Inside the image coordinates are positive, so truncation rounds down.
@@ -251,8 +255,7 @@ fn project_point<const NEAR: bool>(position: [f32; 3], view: &View, halves: bool
     // Finite coordinates count as not finite too if their transform overflows.
     #[allow(clippy::eq_op, reason = "three subtractions vectorise, is_finite does not")]
     let finite = (x - x == 0.0) & (y - y == 0.0) & (z - z == 0.0);
-    let around = if NEAR { cell([x, y, z], first_octave(view.near)) } else { 0 };
-    (if finite { slot } else { NOT_FINITE }, z, sixteenth([x4, y4]), around)
+    ([x, y, z], if finite { slot } else { NOT_FINITE }, sixteenth([x4, y4]))
 }
 
 fn is_owned(key: &AtomicU64) -> bool {

@@ -116,6 +116,17 @@ pub(crate) fn pixel_xy(pixel: u32) -> [usize; 2] {
     [(pixel & 0x7fff) as usize, (pixel >> 16 & 0x7fff) as usize]
 }
 
+/// Whole part of a number from 0 to below 2²³; some number for any other. Unlike a cast, which saturates, this is done
+/// for several numbers at a time on every processor.
+#[inline(always)]
+fn whole(number: f32) -> u32 {
+    /// Numbers from here on are whole: the addition rounds to the nearest.
+    const WHOLE: f32 = (1 << 23) as f32;
+    let rounded = number + WHOLE;
+    let is_above = rounded - WHOLE > number;
+    rounded.to_bits().wrapping_sub(WHOLE.to_bits()).wrapping_sub(u32::from(is_above))
+}
+
 /// The screen points of one frame in cell order, then the points of sparse cells around the eye.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ScreenPoints {

@@ -15,7 +15,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::SlotTable;
+use super::{SlotTable, whole};
 use crate::camera::View;
 
 /// Cells along the side of a face of the cube of directions.
@@ -56,22 +56,28 @@ pub(super) fn first_octave(near: f32) -> u32 {
     (near.to_bits() >> 23) + FIRST_OCTAVE
 }
 
-/// Cell of a position in view space.
+/// Cell of a position in view space, without branches; some cell if the position is not finite.
 #[inline(always)]
 pub(super) fn cell([x, y, z]: [f32; 3], first_octave: u32) -> u32 {
-    let most = x.abs().max(y.abs()).max(z.abs());
-    let (is_x, is_y) = (x.abs() == most, y.abs() == most);
-    let [axis, along, u, v] = match (is_x, is_y) {
-        (true, _) => [0.0, x, y, z],
-        (false, true) => [2.0, y, x, z],
-        (false, false) => [4.0, z, x, y],
-    };
-    let face = axis as u32 + u32::from(along < 0.0);
+    // `f32::max` treats NaN specially, which takes four instructions instead of one.
+    let either = |is_first: bool, first: f32, second: f32| if is_first { first } else { second };
+    let greater = |a: f32, b: f32| either(a > b, a, b);
+    let most = greater(greater(x.abs(), y.abs()), z.abs());
+    let is_x = x.abs() == most;
+    let is_y = !is_x & (y.abs() == most);
+    let [along, u, v] = [either(is_x, x, either(is_y, y, z)), either(is_x, y, x), either(is_x | is_y, z, y)];
+    let face = 4 - 4 * u32::from(is_x) - 2 * u32::from(is_y) + u32::from(along < 0.0);
     let half = 0.5 * FACE_CELLS as f32;
     let scale = half / most;
-    // The casts saturate, so a point at the eye has a cell as well.
-    let [column, row] = [u, v].map(|c| ((c * scale + half) as u32).min(FACE_CELLS as u32 - 1));
-    let octave = (most.to_bits() >> 23).saturating_sub(first_octave).min(OCTAVES as u32 - 1);
+    let last = (FACE_CELLS - 1) as f32;
+    // A point at the eye has a cell as well.
+    let [column, row] = [u, v].map(|c| {
+        let place = greater(c * scale + half, 0.0);
+        whole(either(place < last, place, last))
+    });
+    // Signed, because baseline processors compare only such numbers several at a time.
+    let octave = (most.to_bits() >> 23) as i32 - first_octave as i32;
+    let octave = octave.clamp(0, OCTAVES as i32 - 1) as u32;
     ((octave * 6 + face) * FACE_CELLS as u32 + row) * FACE_CELLS as u32 + column
 }
 

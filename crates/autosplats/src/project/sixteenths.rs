@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU16, Ordering};
 
 use rayon::prelude::*;
 
+use super::whole;
 use crate::camera::View;
 
 /// Sixteenths along each side of a pixel.
@@ -83,7 +84,7 @@ impl Clone for Sixteenths {
 /// Column and row, in sixteenths of the screen, of a place in pixels.
 #[inline(always)]
 pub(crate) fn sixteenths_at(place: [f32; 2]) -> [u32; 2] {
-    place.map(|at| (PER_SIDE as f32 * at) as u32)
+    place.map(|at| whole(PER_SIDE as f32 * at))
 }
 
 /// Index of a sixteenth, by column and row on the screen, within its pixel.

@@ -6,7 +6,7 @@ use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
 
 use super::cpu::MAX_SECOND_DEPTH_PX;
-use super::{Dropped, ProjectRules, Projector, ScreenPoint, ScreenPoints};
+use super::{Dropped, ProjectRules, Projector, ScreenPoint, ScreenPoints, whole};
 use crate::camera::{Camera, Projection};
 use crate::test_clouds::{self, EYE, Positions, Random};
 
@@ -423,6 +423,18 @@ fn density_cells_hold_about_k_points() {
         let mean = screen.points.len() as f32 / (200.0 * 200.0) * area;
         // Cells have a whole number of pixels.
         assert!((0.6..1.6).contains(&(mean / k as f32)), "k = {k}: {mean} points to a cell");
+    }
+}
+
+#[test]
+fn whole_parts_are_those_of_casts() {
+    let mut random = Random::new(92);
+    let edges =
+        (0..200).flat_map(|number| [number as f32, (number as f32).next_up(), (number as f32 + 1.0).next_down()]);
+    let tie = (1 << 22) as f32 + 0.5;
+    let others = (0..10_000).map(|_| 8_388_607.0 * random.unit().powi(4)).chain([-0.0, 0.5, tie, 8_388_607.5]);
+    for number in edges.chain(others) {
+        assert_eq!(whole(number), number as u32, "{number}");
     }
 }
 
