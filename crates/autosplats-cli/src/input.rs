@@ -1,23 +1,24 @@
 //! Inputs: files and generated scenes, each with an optional pose, read into one cloud.
 
+mod distant;
 mod pose;
+mod trees;
 
 use std::fs::metadata;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use autosplats::PlacedTree;
 use autosplats_cloud::glam::{DMat4, DVec3};
 use autosplats_cloud::{Error, PointCloud, PointFilter, Progress, check_memory, sample_surface};
-use autosplats_formats::{Part, ReadOptions, read_mesh};
+use autosplats_formats::{ReadOptions, read_mesh};
 use autosplats_scenes::{SCENE_PREFIX, Scene};
-use autosplats_sources::{Input, LatestOptions, Live, PlayOptions, Player, Source, beginnings, read_tree};
+use autosplats_sources::{Input, LatestOptions, Live, PlayOptions, Player, Source, beginnings};
 use rayon::prelude::*;
 
+use self::distant::{note_distant_inputs, world_box};
 use self::pose::read_pose;
-use crate::args::{InputArgs, PartArgs, PlayingArgs, ReadingArgs};
+use crate::args::{InputArgs, PlayingArgs, ReadingArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::output::{ReadFiles, folder_of};
@@ -25,11 +26,6 @@ use crate::progress::{Bar, InputProgress};
 
 /// Most fields and inputs that a message names.
 const MAX_LISTED_NAMES: usize = 10;
-/// Gap between two inputs, in sizes of the larger one, above which a picture of both shows each as a few pixels.
-const MAX_GAP_SIZES: f64 = 200.0;
-
-/// Files of fewer points are read whole, since that takes no longer than choosing.
-const MIN_TREE_POINTS: u64 = 20_000_000;
 
 /// The inputs of one command. All files exist.
 #[derive(Debug)]
@@ -182,73 +178,6 @@ impl Inputs {
     /// Reads all inputs into one cloud.
     pub(crate) fn read(&self, console: &Console) -> Result<PointCloud, Failure> {
         self.read_each(console, false, read_whole)
-    }
-
-    /// Reads a part of all inputs into one cloud, which may be empty. Returns the number of points of which it is a
-    /// part, too.
-    pub(crate) fn read_part(&self, part: &PartArgs, console: &Console) -> Result<(PointCloud, u64), Failure> {
-        let &PartArgs { bounds, spacing } = part;
-        let all = AtomicU64::new(0);
-        let cloud = self.read_each(console, bounds.is_some(), |input, progress| {
-            let is_partial = bounds.is_some() || spacing.is_some();
-            // The box is in the world: where a pose turns the input, no box of the input's is the same.
-            let is_placed = input.world_from_input != DMat4::IDENTITY;
-            let tree = if is_partial && !is_placed && !is_made(input) {
-                input.source.open_tree(&input.options, progress)?
-            } else {
-                None
-            };
-            if let Some(tree) = tree {
-                all.fetch_add(tree.info().points, Ordering::Relaxed);
-                return read_tree(&*tree, &Part { bounds, spacing, ..Part::default() }, &input.options, progress);
-            }
-            if spacing.is_some() {
-                let what = if is_placed { "has a pose" } else { "is no octree (COPC, EPT)" };
-                let what = format!("--spacing: it {what}, so all of it is read; leave --spacing out, or use --voxel");
-                return Err(Error::unsupported(Path::new(&input.name), what));
-            }
-            let mut cloud = read_whole(input, progress)?;
-            all.fetch_add(cloud.len() as u64, Ordering::Relaxed);
-            if let Some([min, max]) = bounds.filter(|_| !is_placed) {
-                cloud.crop(min, max);
-            }
-            Ok(cloud)
-        })?;
-        let mut cloud = cloud;
-        bounds.iter().for_each(|&[min, max]| cloud.crop(min, max));
-        Ok((cloud, all.into_inner()))
-    }
-
-    /// Opens the inputs as octrees, with their poses. `None` if they are to be read whole: one of them is no octree, or
-    /// all are files with few points and `always` is not set.
-    pub(crate) fn trees(&self, always: bool, console: &Console) -> Result<Option<Vec<PlacedTree>>, Failure> {
-        let open = |input: &Input| {
-            let bar = Bar::on_file("opening", Path::new(&input.name), console);
-            if is_made(input) {
-                return Ok(None);
-            }
-            let tree = input.source.open_tree(&input.options, &bar).map_err(|error| failure(input, error))?;
-            Ok(tree.map(|tree| PlacedTree { tree, world_from_tree: input.world_from_input }))
-        };
-        let trees: Vec<Option<PlacedTree>> = self.list.iter().map(open).collect::<Result<_, Failure>>()?;
-        let Some(trees) = trees.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
-        let points: u64 = trees.iter().map(|placed| placed.tree.info().points).sum();
-        let is_near = self.list.iter().all(|input| input.source.path().is_some());
-        if is_near && points < MIN_TREE_POINTS && !always {
-            return Ok(None);
-        }
-        let corners = |placed: &PlacedTree| {
-            let [low, high] = placed.tree.info().bounds;
-            let corner = |at: usize| {
-                let [x, y, z] = [0, 1, 2].map(|axis| if at >> axis & 1 == 0 { low[axis] } else { high[axis] });
-                placed.world_from_tree.transform_point3(DVec3::new(x, y, z))
-            };
-            let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-            (0..8).map(corner).fold(none, |[low, high], at| [low.min(at), high.max(at)])
-        };
-        let boxes: Vec<[DVec3; 2]> = trees.iter().map(corners).collect();
-        note_distant_inputs(&boxes, |at, note| console.note(format_args!("{}: {note}", self.list[at].name)));
-        Ok(Some(trees))
     }
 
     /// Name of the first input whose points move.
@@ -414,47 +343,6 @@ fn note_differences(clouds: &[(PointCloud, DMat4)], parts: &[InputProgress<'_>])
         let what = if units { "coordinate systems and units" } else { "coordinate systems" };
         parts[0].note(&format!("the inputs differ in their {what}; nothing is converted, the result has none"));
     }
-}
-
-/// Notes the inputs that lie too far from all others to be seen in one picture. Takes the box of each in the world.
-fn note_distant_inputs(boxes: &[[DVec3; 2]], note: impl Fn(usize, &str)) {
-    if boxes.len() < 2 {
-        return;
-    }
-    // Gap between two boxes, in diagonals of the larger one.
-    let apart = |[low, high]: [DVec3; 2], [other_low, other_high]: [DVec3; 2]| {
-        let gap = (other_low - high).max(low - other_high).max(DVec3::ZERO).length();
-        let size = (high - low).length().max((other_high - other_low).length());
-        if size > 0.0 { gap / size } else { 0.0 }
-    };
-    let nearest = |at: usize| {
-        let others = boxes.iter().enumerate().filter(|&(other, _)| other != at);
-        others.map(|(_, &other)| apart(boxes[at], other)).fold(f64::INFINITY, f64::min)
-    };
-    let mut far: Vec<_> =
-        (0..boxes.len()).map(|at| (at, nearest(at))).filter(|&(_, apart)| apart > MAX_GAP_SIZES).collect();
-    // If every input is far from all others, the first is the reference.
-    if far.len() == boxes.len() {
-        far.remove(0);
-    }
-    for (at, apart) in far {
-        note(
-            at,
-            &format!(
-                "lies {apart:.0} times the inputs' size away from the others; a picture hardly shows both; move it with --pose"
-            ),
-        );
-    }
-}
-
-/// Bounding box of all finite points, in world coordinates.
-fn world_box((cloud, world_from_input): &(PointCloud, DMat4)) -> [DVec3; 2] {
-    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    let each = cloud
-        .positions()
-        .iter()
-        .map(|&position| world_from_input.transform_point3(cloud.origin() + DVec3::from(position.map(f64::from))));
-    each.filter(|place| place.is_finite()).fold(none, |[low, high], place| [low.min(place), high.max(place)])
 }
 
 /// Parses the name of an input. A file must exist.

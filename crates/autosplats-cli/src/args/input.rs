@@ -95,10 +95,9 @@ pub(crate) struct TreeArgs {
     #[arg(long, value_name = "PX", value_parser = values::detail, allow_negative_numbers = true)]
     pub(crate) detail: Option<f64>,
     /// Most points that a picture is made of, such as 5M. If more are needed, the finest are left out everywhere
-    #[arg(long, value_name = "COUNT", value_parser = values::count, default_value = "10M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "COUNT", value_parser = values::count, default_value = "10M")]
     pub(crate) points_budget: usize,
-    /// Memory for the points of octrees and the picture, such as 500M or 2G [default: a quarter of what is free, at most
-    /// 2G]
+    /// Memory for the points of octrees and the picture, such as 500M [default: a quarter of what is free, at most 2G]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,
 }

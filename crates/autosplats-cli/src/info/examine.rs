@@ -5,11 +5,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use autosplats::guess_axes;
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{Error, FieldValues, PointCloud, Progress, Unit, check_memory};
+use autosplats_cloud::{Error, FieldValues, PointCloud, Unit, check_memory};
 use autosplats_formats::{Attribute, Description, ReadOptions, describe, describe_tree};
 use autosplats_sources::{PlayOptions, RecordingSummary, Source, describe_recording};
 use rayon::prelude::*;
 
+use super::notes::NoteCollector;
 use super::report::{AttributeFound, AxesFound, Bounds, CrsFound, Detail, Report, ScanFound};
 use super::spacing;
 use super::statistics::{Statistics, Values};
@@ -36,26 +37,6 @@ pub(super) struct Examiner {
 pub(super) struct Examination {
     pub(super) report: Report,
     pub(super) failure: Option<Failure>,
-}
-
-/// Passes progress to the terminal and collects notes for the report.
-struct NoteCollector<'a> {
-    bar: &'a Bar,
-    notes: Mutex<Vec<String>>,
-}
-
-impl Progress for NoteCollector<'_> {
-    fn report(&self, fraction: f32) {
-        self.bar.report(fraction);
-    }
-
-    fn cancelled(&self) -> bool {
-        self.bar.cancelled()
-    }
-
-    fn note(&self, note: &str) {
-        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.into());
-    }
 }
 
 impl Examiner {
@@ -93,11 +74,9 @@ impl Examiner {
         }
         let _alone = (bytes >= LARGE_FILE_BYTES).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
         let bar = Bar::on_file("reading", path, &self.console);
-        let listener = NoteCollector { bar: &bar, notes: Mutex::default() };
+        let listener = NoteCollector::new(&bar);
         let cloud = source.read(&self.options, &listener);
-        for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            report.warn(note);
-        }
+        listener.notes().into_iter().for_each(|note| report.warn(note));
         drop(bar);
         let bar = Bar::spinner("measuring", &self.console);
         report.scan(&cloud?, &header.attributes);
@@ -108,7 +87,7 @@ impl Examiner {
     /// Describes what is behind an address: an octree by its header and hierarchy, all else by its points.
     fn address(&self, name: &str, source: &Source, report: &mut Report) -> Result<(), Error> {
         let bar = Bar::new(&format!("fetching {name}"), &self.console);
-        let listener = NoteCollector { bar: &bar, notes: Mutex::default() };
+        let listener = NoteCollector::new(&bar);
         let tree = source.open_tree(&self.options, &listener)?;
         if let Some(tree) = &tree {
             report.describe(&describe_tree(&**tree));
@@ -118,16 +97,14 @@ impl Examiner {
             report.format.get_or_insert_with(|| "remote file".into());
             report.scan(&cloud, &[]);
         }
-        for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            report.warn(note);
-        }
+        listener.notes().into_iter().for_each(|note| report.warn(note));
         Ok(())
     }
 
     /// Describes a moving input by its container's summary and its first points.
     fn moving(&self, name: &str, source: &Source, report: &mut Report) -> Result<(), Error> {
         let bar = Bar::new(&format!("reading {name}"), &self.console);
-        let listener = NoteCollector { bar: &bar, notes: Mutex::default() };
+        let listener = NoteCollector::new(&bar);
         if let Source::Recording(path) = source {
             let summary = describe_recording(path, &listener)?;
             report.file_bytes = path.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
@@ -144,9 +121,7 @@ impl Examiner {
             Err(Error::NoFrames { .. }) if player.stream().timeline().is_some() => Arc::default(),
             cloud => cloud?,
         };
-        for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            report.warn(note);
-        }
+        listener.notes().into_iter().for_each(|note| report.warn(note));
         drop(bar);
         report.format.get_or_insert_with(|| "sequence of files".into());
         if !cloud.is_empty() {

@@ -1,6 +1,7 @@
 //! `autosplats info`: describes files.
 
 mod examine;
+mod notes;
 mod report;
 mod spacing;
 mod statistics;

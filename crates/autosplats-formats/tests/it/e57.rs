@@ -70,14 +70,9 @@ fn real_files_are_what_others_say() {
     }
 }
 
-const EXACT: ReadOptions = ReadOptions {
-    exact: true,
-    keep_no_returns: false,
-    columns: None,
-    keep: None,
-    headers: Vec::new(),
-    depth_camera: None,
-};
+fn exact() -> ReadOptions {
+    ReadOptions { exact: true, ..ReadOptions::default() }
+}
 
 /// Writes a cloud and reads it back. Also returns the notes of writing.
 fn round_trip(cloud: &PointCloud, options: &ReadOptions) -> (PointCloud, Vec<String>) {
@@ -101,8 +96,8 @@ fn check_positions(what: &str, back: &PointCloud, cloud: &PointCloud) {
 fn real_files_come_back() {
     let Some(folder) = shared_data() else { return };
     for &(file, ..) in CASES {
-        let (cloud, _) = load(&folder.join(file), &EXACT);
-        let (back, notes) = round_trip(&cloud, &EXACT);
+        let (cloud, _) = load(&folder.join(file), &exact());
+        let (back, notes) = round_trip(&cloud, &exact());
         check_positions(file, &back, &cloud);
         assert_eq!((back.colors(), back.fields()), (cloud.colors(), cloud.fields()), "{file}: colours and fields");
         assert_eq!(back.crs(), cloud.crs(), "{file}: the coordinate system");
@@ -125,7 +120,7 @@ fn fields_of_every_type_come_back() {
             .unwrap()
             .with_field("NumberOfReturns", FieldValues::U8(values(1).into_iter().map(|v| v as u8).collect()))
             .unwrap();
-        let (back, notes) = round_trip(&cloud, &EXACT);
+        let (back, notes) = round_trip(&cloud, &exact());
         assert_eq!((back.positions(), back.colors()), (cloud.positions(), cloud.colors()), "{count}: every bit");
         assert_eq!(notes, ["E57 does not store which axis is up"], "{count}: told");
         assert_eq!(back.fields().len(), if count == 0 { back.fields().len() } else { cloud.fields().len() }, "{count}");
@@ -178,7 +173,7 @@ pub(crate) fn posed() -> PointCloud {
 #[test]
 fn poses_scans_and_wide_colours_come_back() {
     let cloud = posed();
-    let (back, notes) = round_trip(&cloud, &EXACT);
+    let (back, notes) = round_trip(&cloud, &exact());
     assert_eq!(notes, [""; 0], "nothing is lost");
     // Points of no scan come last.
     let order: Vec<usize> = (10..40).chain(60..90).chain(0..10).chain(40..60).chain(90..100).collect();
@@ -431,7 +426,7 @@ fn changes_that_checksums_do_not_tell() {
         }
         let lie: Vec<u8> = lie.chunks(1020).flat_map(|page| [page, &checksum(page)].concat()).collect();
         let start = Instant::now();
-        let result = read_bytes(Path::new("a.e57"), &lie, &EXACT, &());
+        let result = read_bytes(Path::new("a.e57"), &lie, &exact(), &());
         assert!(start.elapsed() < Duration::from_secs(2), "round {round} took {:?}", start.elapsed());
         match result {
             Ok(cloud) => assert!(cloud.len() <= lie.len(), "round {round}: {} points", cloud.len()),
@@ -483,12 +478,12 @@ fn constants_and_overlaps_take_no_memory() {
     }
     let eight = "<flag type=\"Integer\" minimum=\"0\" maximum=\"255\"/>";
     let one = scan("480", &(axes(constant) + eight));
-    let cloud = read_bytes(Path::new("a.e57"), &file(&data, &root(&one)), &EXACT, &()).unwrap();
+    let cloud = read_bytes(Path::new("a.e57"), &file(&data, &root(&one)), &exact(), &()).unwrap();
     assert_eq!((cloud.len(), cloud.positions()[479]), (480, [1.0; 3]), "constants are values");
     let bytes = file(&data, &root(&one.repeat(20_000)));
     let start = Instant::now();
     let notes = Notes::default();
-    let cloud = read_bytes(Path::new("a.e57"), &bytes, &EXACT, &notes).unwrap();
+    let cloud = read_bytes(Path::new("a.e57"), &bytes, &exact(), &notes).unwrap();
     assert!(cloud.len() <= bytes.len(), "{} points of {} bytes", cloud.len(), bytes.len());
     let notes = notes.0.into_inner().unwrap().join("\n");
     assert!(notes.contains("overlap"), "{notes}");

@@ -187,8 +187,8 @@ pub(crate) fn measure(
     FrameStatistics { noise, k_radius, sheet_level }
 }
 
-/// Limit of the [`hash_index`] of a point's name below which a surfel is sampled, for a number of surfels. Choosing by point
-/// keeps the sample nearly the same from frame to frame. Choosing by place, one more surfel would change all of it.
+/// Limit of the [`hash_index`] of a point's name below which a surfel is sampled, for a number of surfels. Choosing by
+/// point keeps the sample nearly the same from frame to frame. Choosing by place, one more surfel would change it all.
 fn picked_below(surfels: usize) -> u32 {
     (u32::MAX / surfels.max(NOISE_SAMPLE_COUNT) as u32).saturating_mul(NOISE_SAMPLE_COUNT as u32)
 }

@@ -14,8 +14,8 @@
 //! A coarser grid, with about k screen points to a cell, counts points for the first search radius (§5.1). The grid
 //! also holds the nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
 //!
-//! The points come in runs, each about an origin of its own (`slots`); all that leaves the stage is in view space. Points
-//! of surfaces that the eye almost touches are listed once more, also beside the screen (`near`).
+//! The points come in runs, each about an origin of its own (`slots`); all that leaves the stage is in view space.
+//! Points of surfaces that the eye almost touches are listed once more, also beside the screen (`near`).
 //!
 //! Every point on the screen marks the sixteenth of its pixel that it falls into, with one bit that points there share.
 //! The splatting finds the borders of surfaces from these bits.

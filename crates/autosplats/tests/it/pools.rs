@@ -41,7 +41,7 @@ fn piece(cloud: &PointCloud, points: Range<usize>, origin: DVec3) -> PointCloud 
     piece
 }
 
-/// A pool of pieces of `len` points each, all of which are chosen, with the origin of the cloud or origins of their own.
+/// A pool of pieces of `len` points each, all of them chosen, with the origin of the cloud or origins of their own.
 fn cut(cloud: &PointCloud, len: usize, own_origins: bool) -> PointPool {
     let slots = cloud.len().div_ceil(len) * len.div_ceil(SLOT_POINTS);
     let mut pool = PointPool::new(cloud, slots * SLOT_POINTS).expect("a pool");
