@@ -24,7 +24,7 @@ fn report(folder: &Folder, arguments: &[&str]) -> Value {
 /// Root of the mean square difference of two pictures, of 255.
 fn difference(folder: &Folder, a: &str, b: &str) -> f64 {
     let [a, b] = [a, b].map(|name| image::open(folder.path(name)).expect("a picture").to_rgb8());
-    assert_eq!(a.dimensions(), b.dimensions());
+    assert_eq!(a.dimensions(), b.dimensions(), "one size");
     let squares = a.as_raw().iter().zip(b.as_raw()).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2));
     (squares.sum::<f64>() / a.as_raw().len() as f64).sqrt()
 }
@@ -65,7 +65,7 @@ fn pictures_are_the_same_however_points_come() {
     assert_eq!(local["tree"]["points"], remote["tree"]["points"]);
     let (requests, bytes) = (remote["tree"]["requests"].as_u64(), remote["tree"]["bytes"].as_u64());
     let counts = server.counts();
-    assert_eq!(requests, Some(counts.requests as u64), "requests are counted");
+    assert_eq!(requests, Some(counts.requests), "requests are counted");
     assert!(requests.is_some_and(|requests| requests <= 12), "few are needed: {requests:?}");
     let size = fs::metadata(scans.join(LION)).expect("a file").len();
     assert!(bytes.is_some_and(|bytes| bytes <= size + (128 << 10)), "nothing is read twice: {bytes:?} of {size}");
