@@ -151,8 +151,11 @@ impl TreeScene {
                 shown.damage.get_or_insert(damage);
             }
             let cloud = completed(cloud, pool.sample());
-            // Half of the slots suffices for what is chosen.
-            assert!(pool.insert(node, &cloud), "the chosen nodes fit");
+            // Half of the slots suffices for what is chosen, unless a single node is larger.
+            if !pool.insert(node, &cloud) {
+                let what = format!("the {} points of node {}", cloud.len(), node.key);
+                return Err(autosplats_cloud::Error::OutOfMemory { what, bytes: cloud.byte_len() }.into());
+            }
             Ok(())
         })?;
         pool.choose(&nodes);

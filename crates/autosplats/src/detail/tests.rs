@@ -383,6 +383,10 @@ fn damage_is_told_and_the_rest_is_shown() {
     assert_eq!(shown.damaged, [1, lost]);
     assert!(shown.damage.as_ref().is_some_and(|damage| damage.contains("it is damaged")), "{shown:?}");
     assert_eq!(scene.points().chosen_points(), 50_000 - lost as usize);
+    let mut tight = TreeScene::open(vec![placed(MemoryTree::new(sphere(50_000)))], Wanted::default(), 100, 1000, &())
+        .expect("the sample needs no room");
+    let none = tight.show(&all, [30, 30], &detail(1.0), &());
+    assert!(matches!(none, Err(Error::Reading(_))), "not even the root fits: {none:?}");
     let empty = MemoryTree::new(PointCloud::new(DVec3::ZERO, Vec::new()));
     let opened = TreeScene::open(vec![placed(empty)], Wanted::default(), 1 << 20, 1000, &());
     assert!(matches!(opened, Err(Error::NothingVisible(_))), "no points");
