@@ -1,6 +1,6 @@
 //! Files behind addresses, and octrees: these are read in parts, all else whole.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use autosplats_cloud::{Error, PointCloud, Progress, Tree, Wanted};
@@ -38,15 +38,16 @@ pub(crate) fn short_name(address: &str) -> String {
     path.rsplit('/').next().unwrap_or(path).into()
 }
 
-/// Whether a path is a folder of EPT, or the file that describes one.
-pub(crate) fn is_ept(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name == EPT) || path.join(EPT).is_file()
+/// The file that describes a folder as an octree, if there is one.
+pub(crate) fn ept_in(folder: &Path) -> Option<PathBuf> {
+    Some(folder.join(EPT)).filter(|file| file.is_file())
 }
 
 /// Reads a local file whole.
 pub(crate) fn read_file(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
     // Other octrees are read whole as files, which is faster.
-    match is_ept(path).then(|| open_local(path, progress)).transpose()?.flatten() {
+    let is_ept = path.file_name().is_some_and(|name| name == EPT);
+    match is_ept.then(|| open_local(path, progress)).transpose()?.flatten() {
         Some(tree) => read_tree(&*tree, &Part::default(), options, progress),
         None => read_with(path, options, progress),
     }

@@ -138,8 +138,8 @@ impl Source {
             Ok(Self::Address(name.into()))
         } else if is_recording(path) {
             Ok(Self::Recording(path.into()))
-        } else if address::is_ept(path) {
-            Ok(Self::File(path.into()))
+        } else if let Some(file) = address::ept_in(path) {
+            Ok(Self::File(file))
         } else if path.is_dir() || name.contains(['*', '?']) && !path.exists() {
             Ok(Self::Sequence(name.into()))
         } else {
@@ -348,6 +348,10 @@ mod tests {
         }
         assert_eq!(kind(&path("depth_*.pgm")).files().last(), Some(&path("color_1.png").into()), "the colours as well");
         assert!(matches!(kind("scene:statue:1K"), Source::Scene(_, 1000)), "a scene");
+        assert!(matches!(kind("https://a.b/c.copc.laz"), Source::Address(_)), "an address of a file");
+        std::fs::create_dir(path("ept")).expect("a folder");
+        std::fs::write(path("ept/ept.json"), "{}").expect("a file");
+        assert!(matches!(kind(&path("ept")), Source::File(file) if file.ends_with("ept.json")), "a folder of EPT");
         std::fs::write(path("metadata.yaml"), "rosbag2_bagfile_information:").expect("a file");
         assert!(matches!(kind(&path("")), Source::Recording(_)), "a folder of ROS 2");
     }

@@ -3,9 +3,8 @@
 use std::fs::File;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::{Ranges, Traffic, check_range};
+use super::{Counter, Ranges, Traffic, check_range};
 use crate::{Error, Progress, check_memory};
 
 /// Ranges of a local file.
@@ -14,8 +13,7 @@ pub struct FileRanges {
     path: PathBuf,
     file: File,
     size: u64,
-    requests: AtomicU64,
-    read: AtomicU64,
+    read: Counter,
 }
 
 impl FileRanges {
@@ -30,7 +28,7 @@ impl FileRanges {
             Ok((file, size))
         };
         let (file, size) = open().map_err(|source| Error::Io { path: path.into(), source })?;
-        Ok(Self { path: path.into(), file, size, requests: AtomicU64::new(0), read: AtomicU64::new(0) })
+        Ok(Self { path: path.into(), file, size, read: Counter::default() })
     }
 
     fn one(&self, range: &Range<u64>) -> Result<Vec<u8>, Error> {
@@ -40,8 +38,7 @@ impl FileRanges {
         let mut bytes = vec![0; len as usize];
         read_exact_at(&self.file, &mut bytes, range.start)
             .map_err(|source| Error::Io { path: self.path.clone(), source })?;
-        self.requests.fetch_add(1, Ordering::Relaxed);
-        self.read.fetch_add(len, Ordering::Relaxed);
+        self.read.add(len);
         Ok(bytes)
     }
 }
@@ -61,7 +58,7 @@ impl Ranges for FileRanges {
     }
 
     fn traffic(&self) -> Traffic {
-        Traffic { requests: self.requests.load(Ordering::Relaxed), bytes: self.read.load(Ordering::Relaxed) }
+        self.read.traffic()
     }
 }
 

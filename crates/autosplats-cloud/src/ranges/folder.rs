@@ -2,9 +2,8 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::Traffic;
+use super::{Counter, Traffic};
 use crate::{Error, Progress, check_memory};
 
 /// Files below one address that are small enough to be read whole, on many threads at once.
@@ -28,14 +27,13 @@ pub trait Folder: Send + Sync + fmt::Debug {
 #[derive(Debug)]
 pub struct LocalFolder {
     path: PathBuf,
-    requests: AtomicU64,
-    read: AtomicU64,
+    read: Counter,
 }
 
 impl LocalFolder {
     /// The folder at `path`, which is not looked at before a file is read.
     pub fn new(path: impl Into<PathBuf>) -> Self {
-        Self { path: path.into(), requests: AtomicU64::new(0), read: AtomicU64::new(0) }
+        Self { path: path.into(), read: Counter::default() }
     }
 
     fn one(&self, name: &str, most: u64) -> Result<Vec<u8>, Error> {
@@ -47,8 +45,7 @@ impl LocalFolder {
         }
         check_memory("a file of a tree", size)?;
         let bytes = std::fs::read(&path).map_err(fail)?;
-        self.requests.fetch_add(1, Ordering::Relaxed);
-        self.read.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        self.read.add(bytes.len() as u64);
         Ok(bytes)
     }
 }
@@ -69,7 +66,7 @@ impl Folder for LocalFolder {
     }
 
     fn traffic(&self) -> Traffic {
-        Traffic { requests: self.requests.load(Ordering::Relaxed), bytes: self.read.load(Ordering::Relaxed) }
+        self.read.traffic()
     }
 }
 

@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::{Ranges, Traffic, check_range};
+use super::{Counter, Ranges, Traffic, check_range};
 use crate::{Error, Progress};
 
 /// Ranges of bytes that are in memory.
@@ -12,14 +11,13 @@ use crate::{Error, Progress};
 pub struct MemoryRanges {
     name: PathBuf,
     bytes: Vec<u8>,
-    requests: AtomicU64,
-    read: AtomicU64,
+    read: Counter,
 }
 
 impl MemoryRanges {
     /// Takes `bytes`; `name` is for messages.
     pub fn new(name: impl Into<PathBuf>, bytes: Vec<u8>) -> Self {
-        Self { name: name.into(), bytes, requests: AtomicU64::new(0), read: AtomicU64::new(0) }
+        Self { name: name.into(), bytes, read: Counter::default() }
     }
 }
 
@@ -38,15 +36,14 @@ impl Ranges for MemoryRanges {
                 return Err(Error::Cancelled);
             }
             check_range(&self.name, range, self.size())?;
-            self.requests.fetch_add(1, Ordering::Relaxed);
-            self.read.fetch_add(range.end - range.start, Ordering::Relaxed);
+            self.read.add(range.end - range.start);
             Ok(self.bytes[range.start as usize..range.end as usize].to_vec())
         };
         ranges.iter().map(one).collect()
     }
 
     fn traffic(&self) -> Traffic {
-        Traffic { requests: self.requests.load(Ordering::Relaxed), bytes: self.read.load(Ordering::Relaxed) }
+        self.read.traffic()
     }
 }
 

@@ -7,6 +7,7 @@ mod memory;
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::{Error, Progress};
 
@@ -41,6 +42,25 @@ pub struct Traffic {
     pub requests: u64,
     /// Bytes received.
     pub bytes: u64,
+}
+
+/// Counts reading, on many threads at once.
+#[derive(Debug, Default)]
+struct Counter {
+    requests: AtomicU64,
+    bytes: AtomicU64,
+}
+
+impl Counter {
+    /// Counts a read of `bytes`.
+    fn add(&self, bytes: u64) {
+        self.requests.fetch_add(1, Ordering::Relaxed);
+        self.bytes.fetch_add(bytes, Ordering::Relaxed);
+    }
+
+    fn traffic(&self) -> Traffic {
+        Traffic { requests: self.requests.load(Ordering::Relaxed), bytes: self.bytes.load(Ordering::Relaxed) }
+    }
 }
 
 /// Fails for a range that reaches beyond `size` bytes.
