@@ -25,7 +25,7 @@ impl Inputs {
     pub(crate) fn read_part(&self, part: &PartArgs, console: &Console) -> Result<(PointCloud, u64), Failure> {
         let &PartArgs { bounds, spacing } = part;
         let all = AtomicU64::new(0);
-        let cloud = self.read_each(console, bounds.is_some(), |input, progress| {
+        let mut cloud = self.read_each(console, bounds.is_some(), |input, progress| {
             let is_partial = bounds.is_some() || spacing.is_some();
             // The box is in the world: where a pose turns the input, no box of the input's is the same.
             let is_placed = input.world_from_input != DMat4::IDENTITY;
@@ -43,14 +43,10 @@ impl Inputs {
                 let what = format!("--spacing: it {what}, so all of it is read; leave --spacing out, or use --voxel");
                 return Err(Error::unsupported(Path::new(&input.name), what));
             }
-            let mut cloud = read_whole(input, progress)?;
+            let cloud = read_whole(input, progress)?;
             all.fetch_add(cloud.len() as u64, Ordering::Relaxed);
-            if let Some([min, max]) = bounds.filter(|_| !is_placed) {
-                cloud.crop(min, max);
-            }
             Ok(cloud)
         })?;
-        let mut cloud = cloud;
         bounds.iter().for_each(|&[min, max]| cloud.crop(min, max));
         Ok((cloud, all.into_inner()))
     }
@@ -67,7 +63,12 @@ impl Inputs {
             Ok(tree.map(|tree| PlacedTree { tree, world_from_tree: input.world_from_input }))
         };
         let trees: Vec<Option<PlacedTree>> = self.list.iter().map(open).collect::<Result<_, Failure>>()?;
-        let Some(trees) = trees.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
+        let Some(trees) = trees.into_iter().collect::<Option<Vec<_>>>() else {
+            if always {
+                console.note("--detail is ignored: not all inputs are octrees (COPC, EPT), so all points are read");
+            }
+            return Ok(None);
+        };
         let points: u64 = trees.iter().map(|placed| placed.tree.info().points).sum();
         let is_near = self.list.iter().all(|input| input.source.path().is_some());
         if is_near && points < MIN_TREE_POINTS && !always {

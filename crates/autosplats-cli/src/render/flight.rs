@@ -52,12 +52,21 @@ impl Still {
         }
     }
 
-    /// Loads what a picture needs.
-    fn show(&mut self, job: &Job, camera: &Camera, notes: &Notes<'_>) -> Result<Option<TreeReport>, Failure> {
+    /// Loads what a picture needs. If it `tells`, notes say what the picture lacks.
+    fn show(
+        &mut self,
+        job: &Job,
+        camera: &Camera,
+        notes: &Notes<'_>,
+        tells: bool,
+    ) -> Result<Option<TreeReport>, Failure> {
         let Self::Trees(scene) = self else { return Ok(None) };
         let started = Instant::now();
         let shown = scene.show(camera, job.size, &scan::detail(job), notes)?;
-        scan::tell(job, scene, &shown, notes)?;
+        scan::check(scene, &shown, notes)?;
+        if tells {
+            scan::tell(job, scene, &shown, notes);
+        }
         Ok(Some(scan::report(scene, &shown, milliseconds_since(started))))
     }
 
@@ -102,7 +111,7 @@ pub(super) fn run(
     job.settle_exposure(still.sample());
     job.settle_first_radius(renderer, still.sample(), &camera(0))?;
     // The first picture tells the range of colours, whichever frames are rendered.
-    still.show(&job, &camera(0), &notes)?;
+    still.show(&job, &camera(0), &notes, true)?;
     job.settle(renderer, still.points(), &camera(0))?;
 
     let begun = Instant::now();
@@ -117,7 +126,7 @@ pub(super) fn run(
                 continue;
             }
             let started = Instant::now();
-            let tree = still.show(&job, &camera(frame), &notes)?;
+            let tree = still.show(&job, &camera(frame), &notes, false)?;
             let read_ms = milliseconds_since(started);
             let rendered = job.render(renderer, still.points(), &camera(frame))?;
             tally.count(frame, &rendered);

@@ -44,7 +44,8 @@ pub(super) fn run(
     job.settle_exposure(scene.sample());
     job.settle_first_radius(renderer, scene.sample(), &camera)?;
     let shown = scene.show(&camera, job.size, &detail(&job), &notes)?;
-    tell(&job, &mut scene, &shown, &notes)?;
+    check(&scene, &shown, &notes)?;
+    tell(&job, &scene, &shown, &notes);
     let read = milliseconds_since(started);
     let tree = Some(report(&scene, &shown, read));
     drop(bar);
@@ -105,11 +106,11 @@ fn memory(job: &Job) -> Result<u64, Failure> {
     Ok(asked - others)
 }
 
-/// Tells what is missing in a picture.
+/// Tells what is odd or damaged in the nodes that were loaded.
 ///
 /// # Errors
-/// If all of it is.
-pub(super) fn tell(job: &Job, scene: &mut TreeScene, shown: &Shown, notes: &Notes<'_>) -> Result<(), Failure> {
+/// If all nodes of the picture are damaged.
+pub(super) fn check(scene: &TreeScene, shown: &Shown, notes: &Notes<'_>) -> Result<(), Failure> {
     scene.take_notes().iter().for_each(|note| notes.note(note));
     let [nodes, points] = shown.damaged;
     if let Some(damage) = &shown.damage {
@@ -118,14 +119,21 @@ pub(super) fn tell(job: &Job, scene: &mut TreeScene, shown: &Shown, notes: &Note
         }
         notes.note(&format!("{points} points in {nodes} nodes are damaged and missing; the first: {damage}"));
     }
-    let asked = detail(job).spacing_px;
-    if shown.spacing_px > asked {
+    Ok(())
+}
+
+/// Tells what a picture lacks on purpose.
+pub(super) fn tell(job: &Job, scene: &TreeScene, shown: &Shown, notes: &Notes<'_>) {
+    let left = (shown.points - shown.damaged[1]).saturating_sub(scene.points().chosen_points() as u64);
+    if let Some(filter) = job.inputs.kept().filter(|_| left > 0) {
+        notes.note(&filter.left_out_note(left, shown.points));
+    }
+    if shown.spacing_px > detail(job).spacing_px {
         notes.note(&format!(
             "neighbouring points are up to {:.1} pixels apart; a larger --points-budget or --memory shows finer ones",
             shown.spacing_px
         ));
     }
-    Ok(())
 }
 
 /// What was read for a picture.

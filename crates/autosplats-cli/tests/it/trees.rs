@@ -7,7 +7,7 @@ use std::time::Duration;
 use autosplats_serve::Server;
 use serde_json::Value;
 
-use crate::common::{Folder, data};
+use crate::common::{Folder, data, ply};
 
 const LION: &str = "lion_takanawa.copc.laz";
 
@@ -195,4 +195,50 @@ fn a_camera_flies_through_views() {
     refused(&["-o", "x.png", "--camera-path", "a.json,b.json"], &["--camera-path", "film"]);
     refused(&["-o", "x_%d.png", "--camera-path", "a.json"], &["--camera-path", "two"]);
     refused(&["-o", "x_%d.png", "--camera-path", "a.json,no.json"], &["no.json"]);
+}
+
+/// Writes EPT of one node, `node.laz` of the folder, whose points are in the box from 0 to 1000.
+fn write_ept(folder: &Folder, points: usize) {
+    for part in ["ept/ept-data", "ept/ept-hierarchy"] {
+        fs::create_dir_all(folder.path(part)).expect("a folder");
+    }
+    fs::rename(folder.path("node.laz"), folder.path("ept/ept-data/0-0-0-0.laz")).expect("a file");
+    let coordinate = |name| serde_json::json!({"name": name, "size": 4, "type": "signed", "scale": 0.001, "offset": 0});
+    let class = serde_json::json!({"name": "Classification", "size": 1, "type": "unsigned"});
+    let bounds = [0, 0, 0, 1000, 1000, 1000];
+    let described = serde_json::json!({
+        "bounds": bounds, "boundsConforming": bounds, "dataType": "laszip", "hierarchyType": "json", "points": points,
+        "schema": [coordinate("X"), coordinate("Y"), coordinate("Z"), class], "span": 128, "version": "1.0.0",
+    });
+    folder.write("ept/ept.json", &described.to_string());
+    folder.write("ept/ept-hierarchy/0-0-0-0.json", &serde_json::json!({"0-0-0-0": points}).to_string());
+}
+
+#[test]
+fn points_that_are_left_out_of_octrees_are_told() {
+    let folder = Folder::new();
+    let wall = (0..400).map(|i| format!("{} {} {} {}", i % 20, 0.1 * f64::from(i % 7), 1 + i / 20, 2));
+    let noise = (0..40).map(|i| format!("{} 0 {} 7", 0.1 * f64::from(i % 5), 900.0 + 0.1 * f64::from(i / 5)));
+    let columns = ["float x", "float y", "float z", "uchar classification"];
+    folder.write("wall.ply", &ply(&columns, wall.chain(noise)));
+    folder.succeed(&["convert", "wall.ply", "node.laz"]);
+    write_ept(&folder, 440);
+    let server = Server::start(folder.path(""), Duration::ZERO).expect("a server");
+    for name in ["ept", "ept/ept.json", &server.address("ept/ept.json")] {
+        let picture = |more: &[&str]| {
+            let usual = ["render", name, "-o", "a.png", "--size", "64x48", "--supersample", "1", "--detail", "1"];
+            folder.succeed(&[&usual[..], more].concat()).stderr
+        };
+        let usual = picture(&[]);
+        assert!(usual.contains("left out 40 of 440 points") && usual.contains("400 points"), "{name}: {usual}");
+        let all = picture(&["--keep", "all"]);
+        assert!(all.contains("440 points") && !all.contains("left out"), "{name}: {all}");
+        let noise = picture(&["--keep", "7"]);
+        assert!(noise.contains("--keep 7 left out 400 of 440 points"), "{name}: {noise}");
+        folder.fail(&["render", name, "-o", "b.png", "--detail", "1", "--keep", "9"], 3, &["nothing to show"]);
+        let info: Value = serde_json::from_str(&folder.succeed(&["info", "--json", name]).stdout).expect("JSON");
+        assert_eq!(info["points"], 440, "{name}: {info}");
+    }
+    let ignored = folder.succeed(&["render", "wall.ply", "-o", "a.png", "--size", "64x48", "--detail", "1"]).stderr;
+    assert!(ignored.contains("--detail is ignored"), "{ignored}");
 }

@@ -119,6 +119,16 @@ impl PointFilter {
         self.text == words::USUAL
     }
 
+    /// Tells that `left` of `all` points were left out, where it is not known why each was.
+    #[must_use]
+    pub fn left_out_note(&self, left: u64, all: u64) -> String {
+        if self.is_usual() {
+            format!("left out {left} of {all} points: noise or withheld; --keep all keeps them")
+        } else {
+            format!("--keep {self} left out {left} of {all} points")
+        }
+    }
+
     /// Whether the filter looks at a field of this name.
     #[must_use]
     pub fn needs(&self, field: &str) -> bool {

@@ -72,10 +72,8 @@ pub fn read_part(tree: &dyn Tree, part: &Part, wanted: &Wanted, progress: &dyn P
     }
     let (read, left) = (reading.read, reading.read - cloud.len() as u64);
     if let Some(filter) = wanted.keep.as_ref().filter(|_| left > 0) {
-        if !cloud.is_empty() && filter.is_usual() {
-            progress.note(&format!("left out {left} of {read} points: noise or withheld; --keep all keeps them"));
-        } else if !cloud.is_empty() {
-            progress.note(&format!("--keep {filter} left out {left} of {read} points"));
+        if !cloud.is_empty() {
+            progress.note(&filter.left_out_note(left, read));
         } else if filter.is_usual() {
             progress.note(&format!("all {read} points are noise or withheld, so they are kept"));
             return read_part(tree, part, &Wanted { keep: None, ..wanted.clone() }, progress);

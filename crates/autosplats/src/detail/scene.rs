@@ -70,8 +70,21 @@ impl TreeScene {
         max_points: usize,
         progress: &dyn Progress,
     ) -> Result<Self, Error> {
-        let first = coarsest(&trees, &wanted, progress)?;
-        let sample = sample(&trees, &first);
+        let mut wanted = wanted;
+        let mut first = coarsest(&trees, &wanted, progress)?;
+        let mut sample = sample_of(&trees, &first);
+        if let Some(filter) = wanted.keep.clone().filter(|_| !sample.has_finite(1)) {
+            // Finer nodes may have what the filter keeps. All points tell where to look.
+            let all = Wanted { keep: None, ..wanted.clone() };
+            first = coarsest(&trees, &all, progress)?;
+            sample = sample_of(&trees, &first);
+            if filter.is_usual() {
+                progress.note("all of the coarsest points are noise or withheld, so such points are kept");
+                wanted = all;
+            } else {
+                first.clear();
+            }
+        }
         if !sample.has_finite(1) {
             return Err(Error::NothingVisible("the coarsest points have no finite coordinates".into()));
         }
@@ -219,19 +232,23 @@ fn coarsest(
             columns = columns.with_field(field, FieldValues::U8(Vec::new()))?;
         }
     }
-    let mut first = Vec::new();
+    let (mut first, mut damaged) = (Vec::new(), None);
     load_nodes(trees, &nodes, wanted, progress, |NodePoints { node, cloud, damage }| {
         // A damaged node is told of when a picture needs it.
-        if damage.is_none() {
-            first.push((node, completed(cloud, &columns)));
+        match damage {
+            None => first.push((node, completed(cloud, &columns))),
+            Some(damage) => damaged = Some(damage),
         }
         Ok(())
     })?;
-    Ok(first)
+    match damaged.filter(|_| first.is_empty()) {
+        Some(damage) => Err(Error::NothingVisible(damage)),
+        None => Ok(first),
+    }
 }
 
 /// Points that stand for all of the trees.
-fn sample(trees: &[PlacedTree], first: &[(NodeKey, PointCloud)]) -> PointCloud {
+fn sample_of(trees: &[PlacedTree], first: &[(NodeKey, PointCloud)]) -> PointCloud {
     let parts: Vec<_> = first.iter().map(|(_, cloud)| (cloud, DMat4::IDENTITY)).collect();
     let sample = PointCloud::merged(&parts);
     // Poses may turn what the files state.
