@@ -45,6 +45,10 @@ pub(super) fn run(
     job.settle_first_radius(renderer, scene.sample(), &camera)?;
     let shown = scene.show(&camera, job.size, &detail(&job), &notes)?;
     check(&scene, &shown, &notes)?;
+    if let Some(filter) = job.inputs.kept().filter(|_| scene.points().chosen_points() == 0 && shown.points > 0) {
+        let points = shown.points;
+        return Err(Failure::new(Exit::Input, format!("{names}: --keep {filter} leaves none of its {points} points")));
+    }
     tell(&job, &scene, &shown, &notes);
     let read = milliseconds_since(started);
     let tree = Some(report(&scene, &shown, read));

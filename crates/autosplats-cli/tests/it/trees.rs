@@ -235,7 +235,11 @@ fn points_that_are_left_out_of_octrees_are_told() {
         assert!(all.contains("440 points") && !all.contains("left out"), "{name}: {all}");
         let noise = picture(&["--keep", "7"]);
         assert!(noise.contains("--keep 7 left out 400 of 440 points"), "{name}: {noise}");
-        folder.fail(&["render", name, "-o", "b.png", "--detail", "1", "--keep", "9"], 3, &["nothing to show"]);
+        folder.fail(
+            &["render", name, "-o", "b.png", "--detail", "1", "--keep", "9"],
+            3,
+            &["--keep 9", "none of its 440"],
+        );
         let info: Value = serde_json::from_str(&folder.succeed(&["info", "--json", name]).stdout).expect("JSON");
         assert_eq!(info["points"], 440, "{name}: {info}");
     }
