@@ -385,14 +385,14 @@ impl Block {
         let SearchInput { screen, view, .. } = *task;
         let beyond = 1.01 * BOUND_STEP * self.threshold.0[lane].sqrt();
         let window = Window::of_sphere(self.center(lane), beyond, view);
-        screen.points.len() > MAX_CANDIDATES && window.candidates(&screen.cells) > MAX_CANDIDATES
+        screen.near_first > MAX_CANDIDATES && window.candidates(&screen.cells) > MAX_CANDIDATES
     }
 
     /// Radius of the bound on search work, world units; infinite without a bound.
     #[cold]
     fn bound_radius(&self, lane: usize, task: &SearchInput) -> f32 {
         let SearchInput { screen, view, .. } = *task;
-        if screen.points.len() <= MAX_CANDIDATES {
+        if screen.near_first <= MAX_CANDIDATES {
             return f32::INFINITY;
         }
         let center = self.center(lane);

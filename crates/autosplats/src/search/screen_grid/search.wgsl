@@ -224,7 +224,7 @@ fn find(query: u32, center: vec3f, initial_radius: f32, of_near: bool) -> Search
 
 // Largest radius that the search of a point may reach, as defined in search/mod.rs.
 fn bound_radius(center: vec3f, initial_radius: f32) -> f32 {
-    if task.visible <= MAX_CANDIDATES {
+    if task.near_first <= MAX_CANDIDATES {
         return MAX_F32;
     }
     var radius = max(initial_radius, MIN_POSITIVE);
