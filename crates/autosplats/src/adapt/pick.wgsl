@@ -3,17 +3,13 @@
 // Reads: counters, surfels, names. Writes: picked, the unordered indices of the sampled surfels, then their number.
 
 #import groups
+#import names
 #import surfel
 
 @group(0) @binding(0) var<storage, read> counters: array<u32>;
 @group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
-// Binary logarithm of the number of points in a slot, then the name of the first point of each slot.
 @group(0) @binding(2) var<storage, read> names: array<u32>;
 @group(0) @binding(3) var<storage, read_write> picked: array<atomic<u32>>;
-
-fn name_of(index: u32) -> u32 {
-    return names[1u + (index >> names[0])] + (index & ((1u << names[0]) - 1u));
-}
 
 fn hash_index(number: u32) -> u32 {
     let first = (number ^ (number >> 16u)) * 0x85ebca6bu;

@@ -92,8 +92,8 @@ pub(crate) use {constants, files, indices};
 /// Files for all stages.
 const SHARED: Library = Library {
     files: &[files!(in "../shared":
-        "cloud_points", "density", "divide", "eigen", "frame", "groups", "half", "layers", "matters", "moved", "neighborhood",
-        "noise", "orthonormal", "picture", "project_point", "put_work", "range_keys", "rank", "reproject", "round", "screen", "surfel",
+        "cloud_points", "density", "divide", "eigen", "frame", "groups", "half", "layers", "matters", "moved", "names",
+        "neighborhood", "noise", "orthonormal", "picture", "project_point", "put_work", "range_keys", "rank", "reproject", "round", "screen", "surfel",
     )],
     constants: &[constants![
         GROUPS_PER_ROW,

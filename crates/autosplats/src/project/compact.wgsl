@@ -1,11 +1,12 @@
 // Lists the owners of slots in cell order, and stores the start of each cell.
 //
-// Reads: keys, counters, block_sums. Writes: source, pixels, cell_start.
+// Reads: keys, counters, block_sums, names. Writes: source, pixels, cell_start.
 
 #import frame
 #import cell_order
 #import groups
 #import keys
+#import names
 #import rank
 
 @group(0) @binding(1) var<storage, read> keys: array<Key>;
@@ -14,6 +15,7 @@
 @group(0) @binding(4) var<storage, read_write> source: array<u32>;
 @group(0) @binding(5) var<storage, read_write> pixels: array<u32>;
 @group(0) @binding(6) var<storage, read_write> cell_start: array<u32>;
+@group(0) @binding(7) var<storage, read> names: array<u32>;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -24,7 +26,7 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         let flag = step * LARGE_GROUP + local;
         let at = block * RANK_BLOCK_FLAGS + flag;
         if at < arrayLength(&keys) {
-            if keys[cell_slot(at, strip_px).slot].point != NO_POINT {
+            if keys[cell_slot(at, strip_px).slot].ordinal != NO_POINT {
                 rank_set(flag);
             }
         }
@@ -41,8 +43,8 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
                 cell_start[place.cell] = index;
             }
             let key = keys[place.slot];
-            if key.point != NO_POINT {
-                source[index] = key.point;
+            if key.ordinal != NO_POINT {
+                source[index] = index_of(key.ordinal);
                 pixels[index] = (place.pixel.y << 16u) | place.pixel.x;
             }
         }

@@ -38,7 +38,7 @@ fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         if at < arrayLength(&keys) {
             let place = cell_slot(at, strip_px);
             let key = keys[place.slot];
-            if key.point != NO_POINT {
+            if key.ordinal != NO_POINT {
                 own += 1u;
                 let cell = density_cell(place.pixel, cell_px, cell_columns);
                 atomicAdd(&density[cell].count, 1u);

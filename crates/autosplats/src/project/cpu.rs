@@ -33,7 +33,7 @@ pub(super) const OCCUPANCY_BLOCK_PX: usize = 16;
 /// Projects clouds. All buffers but the two lists `active` and `passive` are reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Projector {
-    /// Per pixel or half pixel, `depth bits << 32 | point index`. The bits of positive floats order like the floats.
+    /// Per pixel or half pixel, `depth bits << 32 | ordinal of the point`. The bits of positive floats order like the floats.
     keys: Vec<AtomicU64>,
     near: NearCells,
     screen: ScreenPoints,
@@ -152,13 +152,13 @@ fn nearest_per_pixel(
     sixteenths.clear(view);
     let sixteenths = &*sixteenths;
     let [not_finite, behind, outside] = [(); 3].map(|()| AtomicUsize::new(0));
-    points.pieces(view, TASK_POINTS).for_each(|(first, positions, view)| {
+    points.pieces(view, TASK_POINTS).for_each(|(ordinal, positions, view)| {
         if cancel.is_given_up() {
             return;
         }
         let dropped = match near {
-            Some(near) => project_chunk::<true>(positions, first, &view, halves, keys, sixteenths, near),
-            None => project_chunk::<false>(positions, first, &view, halves, keys, sixteenths, &NearCells::default()),
+            Some(near) => project_chunk::<true>(positions, ordinal, &view, halves, keys, sixteenths, near),
+            None => project_chunk::<false>(positions, ordinal, &view, halves, keys, sixteenths, &NearCells::default()),
         };
         not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);
         behind.fetch_add(dropped.behind, Ordering::Relaxed);
@@ -173,11 +173,11 @@ const NOT_FINITE: u32 = u32::MAX;
 const BEHIND: u32 = u32::MAX - 1;
 const OUTSIDE: u32 = u32::MAX - 2;
 
-/// Projects up to [`TASK_POINTS`] points, and counts them in the cells around the eye if `NEAR`. Compiled for the
+/// Projects up to [`TASK_POINTS`] points, of which the first has `ordinal`, and counts them in the cells around the eye if `NEAR`. Compiled for the
 /// baseline processor: wider vectors make projection slower.
 fn project_chunk<const NEAR: bool>(
     positions: &[[f32; 3]],
-    first: u32,
+    ordinal: u32,
     view: &View,
     halves: bool,
     keys: &[AtomicU64],
@@ -215,15 +215,15 @@ fn project_chunk<const NEAR: bool>(
         }
         for lane in 0..positions.len() {
             if NEAR && slot[lane] != NOT_FINITE {
-                near.add(around[lane], first + (group * LANES + lane) as u32);
+                near.add(around[lane], ordinal + (group * LANES + lane) as u32);
             }
             match slot[lane] {
                 NOT_FINITE => dropped.not_finite += 1,
                 BEHIND => dropped.behind += 1,
                 OUTSIDE => dropped.outside += 1,
                 slot => {
-                    let index = first + (group * LANES + lane) as u32;
-                    let key = u64::from(z[lane].to_bits()) << 32 | u64::from(index);
+                    let ordinal = ordinal + (group * LANES + lane) as u32;
+                    let key = u64::from(z[lane].to_bits()) << 32 | u64::from(ordinal);
                     // Most points lose in a marked sixteenth: without a write they take no cache line from other
                     // threads.
                     if key < before[lane] {
@@ -336,7 +336,7 @@ fn compact(cloud: &SlotTable<'_>, view: &View, keys: &Keys, spacing_px: f32, scr
                 let key = key.load(Ordering::Relaxed);
                 if key != EMPTY_KEY {
                     points[next].pixel = (y << 16 | x) as u32;
-                    source[next] = key as u32;
+                    source[next] = cloud.names.index(key as u32);
                     next += 1;
                 }
             }

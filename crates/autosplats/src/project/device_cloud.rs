@@ -143,8 +143,8 @@ impl DeviceCloud {
             (self.capacity, self.chunks) = (grown, chunks);
         }
         if self.names.is_none() {
-            // The shift, and at least the two slots of a cloud.
-            self.names = Some(gpu.storage::<u32>("names of points", self.capacity.div_ceil(SLOT_POINTS) + 3)?);
+            // The shift, and two words a slot. A cloud has two slots at least.
+            self.names = Some(gpu.storage::<u32>("names of points", 2 * self.capacity.div_ceil(SLOT_POINTS) + 5)?);
         }
         (self.points, self.slot_shift) = (points, of.slot_shift());
         self.write_uniforms(gpu);

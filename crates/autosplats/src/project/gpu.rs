@@ -100,7 +100,7 @@ pub(crate) fn few(gpu: &Gpu) -> u32 {
     if gpu.is_software() { 16 } else { 4 }
 }
 
-/// Words of an entry of a cell around the eye: index and position of a point.
+/// Words of an entry of a cell around the eye: ordinal and position of a point.
 const ENTRY_WORDS: usize = 4;
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = crate::gpu::LARGE_GROUP;
@@ -377,6 +377,8 @@ impl ProjectPasses {
         cloud: &DeviceCloud,
         screen: &ScreenBuffers,
     ) -> Vec<Step> {
+        // Without room there are no points.
+        let Some(names) = cloud.names() else { return Vec::new() };
         let ScreenBuffers { counters, keys, near, density, cell_start, sixteenths, .. } = screen;
         let ScreenBuffers { source, pixels, points, values, block_sums, .. } = screen;
         let [width, height] = screen.size;
@@ -394,9 +396,9 @@ impl ProjectPasses {
         let blocks = slots.max(screen.capacity).div_ceil(RANK_BLOCK_FLAGS);
         steps.push(self.count.step(gpu, &[frame, keys, counters, block_sums, density], blocks));
         steps.push(self.scan_visible.step(gpu, &[frame, block_sums, counters], 1));
-        let compact = [frame, keys, counters, block_sums, source, pixels, cell_start];
+        let compact = [frame, keys, counters, block_sums, source, pixels, cell_start, names];
         steps.push(self.compact.step(gpu, &compact, slot_blocks));
-        steps.push(self.list_near.step(gpu, &[frame, near, counters, source], 1));
+        steps.push(self.list_near.step(gpu, &[frame, near, counters, source, names], 1));
         steps.push(self.work.step(gpu, frame, screen));
         for chunk in cloud.chunks() {
             let Chunk { uniform, positions, values: stored, .. } = chunk;

@@ -1,14 +1,16 @@
 // Lists the points of the sparse cells around the eye after the screen points, if any is near: see `near.rs`.
 //
-// Reads: near. Reads and writes: counters. Writes: source. One workgroup; each invocation takes a run of cells.
+// Reads: near, names. Reads and writes: counters. Writes: source. One workgroup; each invocation takes a run of cells.
 
 #import frame
+#import names
 #import near_cells
 #import near_points
 
 @group(0) @binding(1) var<storage, read> near: array<u32>;
 @group(0) @binding(2) var<storage, read_write> counters: array<u32>;
 @group(0) @binding(3) var<storage, read_write> source: array<u32>;
+@group(0) @binding(4) var<storage, read> names: array<u32>;
 
 const CELLS_EACH = NEAR_CELLS / LARGE_GROUP;
 
@@ -24,7 +26,7 @@ fn listed_len(cell: u32) -> u32 {
     return select(0u, near[cell], is_listed);
 }
 
-// Whether an entry comes before another: by the bits of positions, then by index.
+// Whether an entry comes before another: by the bits of positions, then by ordinal.
 fn is_before(a: u32, b: u32) -> bool {
     for (var word = 1u; word < ENTRY_WORDS; word++) {
         if near[a + word] != near[b + word] {
@@ -93,7 +95,7 @@ fn list_near(@builtin(local_invocation_index) local: u32) {
             for (var other = 0u; other < len; other++) {
                 rank += u32(is_before(first_entry + other * ENTRY_WORDS, own_entry));
             }
-            source[place + rank] = near[own_entry];
+            source[place + rank] = index_of(near[own_entry]);
         }
         place += len;
     }

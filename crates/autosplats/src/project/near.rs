@@ -41,7 +41,7 @@ pub(crate) const MOST_NEAR: usize = 4096;
 #[derive(Debug, Default)]
 pub(super) struct NearCells {
     counts: Vec<AtomicU32>,
-    /// [`SPARSE_POINTS`] indices of points for each cell; as many as counted are valid, in any order.
+    /// [`SPARSE_POINTS`] ordinals of points for each cell; as many as counted are valid, in any order.
     entries: Vec<AtomicU32>,
     /// The octave of the nearest crowded cell.
     crowded: u32,
@@ -95,15 +95,15 @@ impl NearCells {
         self.listed.clear();
     }
 
-    /// Counts a point.
+    /// Counts the point with an ordinal.
     #[inline(always)]
-    pub(super) fn add(&self, cell: u32, point: u32) {
+    pub(super) fn add(&self, cell: u32, ordinal: u32) {
         let count = &self.counts[cell as usize];
         // Most cells are crowded: a load takes no cache line from other threads.
         if count.load(Ordering::Relaxed) <= SPARSE_POINTS {
             let at = count.fetch_add(1, Ordering::Relaxed);
             if at < SPARSE_POINTS {
-                self.entries[(cell * SPARSE_POINTS + at) as usize].store(point, Ordering::Relaxed);
+                self.entries[(cell * SPARSE_POINTS + at) as usize].store(ordinal, Ordering::Relaxed);
             }
         }
     }
@@ -113,7 +113,7 @@ impl NearCells {
     }
 
     /// Lists the points of the sparse cells; none if they are too many or fewer than `fewest`, or if no point is near.
-    /// The order of the cloud does not matter, apart from points at the same place.
+    /// The order of the points does not matter, unless they are at the same place.
     pub(super) fn list(&mut self, cloud: &SlotTable<'_>, view: &View, fewest: usize) {
         let mut cells = 0..NEAR_CELLS as u32;
         self.crowded = cells.find(|&cell| self.count(cell) > SPARSE_POINTS).map_or(OCTAVES as u32, octave_of);
@@ -124,15 +124,16 @@ impl NearCells {
         if !(fewest..=MOST_NEAR).contains(&total) {
             return;
         }
-        let place = |point: u32| cloud.to_view(point, view).to_array();
+        let place = |index: u32| cloud.to_view(index, view).to_array();
         let mut listed = Vec::with_capacity(total);
         for cell in (0..NEAR_CELLS as u32).filter(sparse) {
             let first = listed.len();
             let entries = &self.entries[(cell * SPARSE_POINTS) as usize..][..self.count(cell) as usize];
-            listed.extend(entries.iter().map(|entry| entry.load(Ordering::Relaxed)));
-            listed[first..].sort_unstable_by_key(|&point| (place(point).map(f32::to_bits), point));
+            listed.extend(entries.iter().map(|entry| cloud.names.index(entry.load(Ordering::Relaxed))));
+            let name = |index: u32| cloud.names.of(index);
+            listed[first..].sort_unstable_by_key(|&index| (place(index).map(f32::to_bits), name(index)));
         }
-        if listed.iter().any(|&point| self.is_near(place(point))) {
+        if listed.iter().any(|&index| self.is_near(place(index))) {
             self.listed = listed;
         }
     }

@@ -24,8 +24,8 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     let pixel = OCCUPANCY_BLOCK_PX * block.yx + vec2u(local % OCCUPANCY_BLOCK_PX, local / OCCUPANCY_BLOCK_PX);
     if all(pixel < frame.size) {
         let slot = (pixel.y * frame.size.x + pixel.x) << frame.halves;
-        var own = u32(keys[slot].point != NO_POINT);
-        if frame.halves == 1u && keys[slot + 1u].point != NO_POINT {
+        var own = u32(keys[slot].ordinal != NO_POINT);
+        if frame.halves == 1u && keys[slot + 1u].ordinal != NO_POINT {
             own += 1u;
             if own == 2u && erase_far(slot) {
                 own = 1u;

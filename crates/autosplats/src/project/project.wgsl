@@ -23,11 +23,11 @@ fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     let index = group_index(workgroup) * LARGE_GROUP + local;
     if is_drawn(index) {
         let projected = project_point(from_eye(index));
-        count_near(projected, chunk.first + index);
+        count_near(projected, ordinal_of(index));
         if projected.slot >= SLOT_OUTSIDE {
             count_dropped(projected.slot);
         } else {
-            let key = (u64(bitcast<u32>(projected.depth)) << 32u) | u64(chunk.first + index);
+            let key = (u64(bitcast<u32>(projected.depth)) << 32u) | u64(ordinal_of(index));
             atomicMin(&keys[projected.slot], key);
             add_sixteenth(projected.sixteenths);
         }

@@ -1,5 +1,5 @@
 // Like `project`, for devices without 64-bit atomics. The first turn finds the nearest depth of each slot, the second
-// the lowest index among the points at that depth. Both turns share one program, because two programs need not compute
+// the lowest ordinal among the points at that depth. Both turns share one program, because two programs need not compute
 // the same bits: a depth that differed between them would leave a hole.
 //
 // Reads: a chunk of the cloud, turn. Writes: keys, counters, sixteenths, near.
@@ -18,12 +18,12 @@
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> sixteenths: array<atomic<u32>>;
 @group(0) @binding(6) var<storage, read_write> near: array<atomic<u32>>;
-// 0 for depths, 1 for indices.
+// 0 for depths, 1 for ordinals.
 @group(0) @binding(7) var<uniform> turn: u32;
 
 // As in `keys`, with atomics.
 struct AtomicKey {
-    point: atomic<u32>,
+    ordinal: atomic<u32>,
     depth: atomic<u32>,
 }
 
@@ -35,7 +35,7 @@ fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
         let projected = project_point(from_eye(index));
         let depth = bitcast<u32>(projected.depth);
         if turn == 0u {
-            count_near(projected, chunk.first + index);
+            count_near(projected, ordinal_of(index));
         }
         if projected.slot >= SLOT_OUTSIDE {
             if turn == 0u {
@@ -45,7 +45,7 @@ fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             atomicMin(&keys[projected.slot].depth, depth);
             add_sixteenth(projected.sixteenths);
         } else if atomicLoad(&keys[projected.slot].depth) == depth {
-            atomicMin(&keys[projected.slot].point, chunk.first + index);
+            atomicMin(&keys[projected.slot].ordinal, ordinal_of(index));
         }
     }
     count_dropped_finish(local);

@@ -22,19 +22,26 @@ pub(crate) struct SlotTable<'a> {
     pub(super) names: PointNames,
 }
 
-/// Numbers by which points are sampled, by slots. Points of a pool are numbered in the order of its runs, as those of a
-/// cloud are: the slots that they happen to lie in make no difference.
+/// What points go by where their indices will not do, because the slots that nodes happen to lie in must make no
+/// difference.
+///
+/// - Points are sampled by *names*: they count up in the order of runs, as the indices of a cloud do.
+/// - Of points in the same place the one with the lowest *ordinal* is seen. An ordinal is an index as if runs lay in slots one
+///   after the other. It orders points as names do, and leads back to the index. The ordinals of a cloud are the indices.
 #[derive(Clone, Debug)]
 pub(crate) struct PointNames {
     shift: u32,
     /// Name of the first point of each slot.
     first: Vec<u32>,
+    /// Index of the first point of each run.
+    runs: Vec<u32>,
 }
 
 impl Default for PointNames {
-    /// The names of a cloud, which are the indices.
+    /// The names and ordinals of a cloud, which are the indices.
     fn default() -> Self {
-        Self { shift: WHOLE_SHIFT, first: vec![0, 1 << WHOLE_SHIFT] }
+        let first = vec![0, 1 << WHOLE_SHIFT];
+        Self { shift: WHOLE_SHIFT, runs: first.clone(), first }
     }
 }
 
@@ -45,13 +52,21 @@ impl PointNames {
         self.first[(index >> self.shift) as usize].wrapping_add(index & ((1 << self.shift) - 1))
     }
 
-    /// The shift, then the first name of each slot, as `pick.wgsl` reads them.
+    /// The index of the point with an ordinal.
+    #[inline(always)]
+    pub(super) fn index(&self, ordinal: u32) -> u32 {
+        self.runs[(ordinal >> self.shift) as usize] + (ordinal & ((1 << self.shift) - 1))
+    }
+
+    /// The shift, then the first name of each slot beside the first index of each run, as `shared/names.wgsl` reads
+    /// them.
     pub(crate) fn on_device(&self) -> Vec<u32> {
-        [&[self.shift], self.first.as_slice()].concat()
+        let runs = self.runs.iter().copied().chain(std::iter::repeat(0));
+        std::iter::once(self.shift).chain(self.first.iter().copied().zip(runs).flat_map(|(a, b)| [a, b])).collect()
     }
 }
 
-/// What the device knows of a slot: four numbers behind the positions, read in `shared/cloud_points.wgsl`.
+/// What the device knows of a slot: five numbers behind the positions, read in `shared/cloud_points.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct DeviceSlot {
@@ -59,11 +74,13 @@ pub(crate) struct DeviceSlot {
     eye: [f32; 3],
     /// Number of points to project, from the first on. In `f32`, because bits of small integers are no normal numbers.
     len: f32,
+    /// Slots from here to where the ordinals of these points are.
+    to_ordinal: f32,
 }
 
 impl DeviceSlot {
     /// A slot without points to project.
-    pub(super) const EMPTY: Self = Self { eye: [0.0; 3], len: 0.0 };
+    pub(super) const EMPTY: Self = Self { eye: [0.0; 3], len: 0.0, to_ordinal: 0.0 };
 }
 
 impl<'a> SlotTable<'a> {
@@ -79,7 +96,8 @@ impl<'a> SlotTable<'a> {
             first[slot] = named;
             named = named.wrapping_add(run.len);
         }
-        Self { positions: points.positions(), runs, shift, eyes, names: PointNames { shift, first } }
+        let names = PointNames { shift, first, runs: runs.iter().map(|run| run.first).collect() };
+        Self { positions: points.positions(), runs, shift, eyes, names }
     }
 
     /// Position in view space of the point at an index.
@@ -89,26 +107,26 @@ impl<'a> SlotTable<'a> {
         view.view_from_world * (Vec3::from(self.positions[index as usize]) - eye)
     }
 
-    /// The points in pieces of at most `most`: index of the first, positions, and the view about their origin.
+    /// The points in pieces of at most `most`: ordinal of the first, positions, and the view about their origin.
     pub(super) fn pieces(&self, view: &View, most: usize) -> impl ParallelIterator<Item = (u32, &'a [[f32; 3]], View)> {
-        let pieces = self.runs.iter().flat_map(|run| {
+        let pieces = self.runs.iter().enumerate().flat_map(|(number, run)| {
             let seen = view.about(run.origin);
-            let (first, len) = (run.first as usize, run.len as usize);
-            (0..len).step_by(most).map(move |at| (first + at..first + len.min(at + most), seen))
+            let (ordinal, first, len) = (number << self.shift, run.first as usize, run.len as usize);
+            (0..len).step_by(most).map(move |at| (ordinal + at, first + at..first + len.min(at + most), seen))
         });
         let pieces: Vec<_> = pieces.collect();
         let positions = self.positions;
-        pieces.into_par_iter().map(move |(piece, seen)| (piece.start as u32, &positions[piece], seen))
+        pieces.into_par_iter().map(move |(ordinal, piece, seen)| (ordinal as u32, &positions[piece], seen))
     }
 
     /// The slots for the device.
     pub(super) fn on_device(&self) -> Vec<DeviceSlot> {
         let mut slots = vec![DeviceSlot::EMPTY; self.eyes.len()];
-        for run in &self.runs {
+        for (number, run) in self.runs.iter().enumerate() {
             let slot = (run.first >> self.shift) as usize;
             // A whole cloud ends where its chunks do.
             let len = if self.shift == SLOT_SHIFT { run.len as f32 } else { f32::MAX };
-            slots[slot] = DeviceSlot { eye: self.eyes[slot].to_array(), len };
+            slots[slot] = DeviceSlot { eye: self.eyes[slot].to_array(), len, to_ordinal: number as f32 - slot as f32 };
         }
         slots
     }

@@ -11,19 +11,24 @@ struct Chunk {
     values: u32,
     // Binary logarithm of the number of points in a slot.
     slot_shift: u32,
-    // Place of the first slot in the positions. A slot has four numbers: the eye about its origin, and how many of its
-    // points are drawn.
+    // Place of the first slot in the positions. A slot has five numbers: the eye about its origin, how many of its
+    // points are drawn, and how many slots further on their ordinals are.
     slots: u32,
 }
 
 fn slot_place(at: u32) -> u32 {
-    return chunk.slots + 4u * (at >> chunk.slot_shift);
+    return chunk.slots + 5u * (at >> chunk.slot_shift);
 }
 
 // Whether there is a point at this place in the chunk that is to be drawn.
 fn is_drawn(at: u32) -> bool {
     let place_in_slot = at & ((1u << chunk.slot_shift) - 1u);
     return at < chunk.len && f32(place_in_slot) < positions[slot_place(at) + 3u];
+}
+
+// Ordinal of the point at this place in the chunk: see `project/slots.rs`.
+fn ordinal_of(at: u32) -> u32 {
+    return chunk.first + at + (u32(i32(positions[slot_place(at) + 4u])) << chunk.slot_shift);
 }
 
 // From the eye to the point at this place in the chunk, in world axes.
