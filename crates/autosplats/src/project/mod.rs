@@ -1,7 +1,7 @@
 //! Project: every point goes to its pixel, and the nearest point of a pixel wins [Paper, §3, §5.1, §7].
 //!
 //! # How it works
-//! A pixel, or each of its two halves, keeps the smallest pair (depth, point index), so a tie goes to the lower index.
+//! A pixel, or each of its two halves, keeps the smallest pair (depth, ordinal): a tie goes to the first of the runs.
 //! Pixels are split left/right and top/bottom like the squares of a chessboard. If the two points of a pixel lie far
 //! apart in depth, only the nearer counts. The paper keeps one point a pixel and names the loss as a weakness:
 //! silhouettes, thin parts and dense regions lack neighbours for the fit.
