@@ -51,6 +51,30 @@ impl PointCloud {
             scan
         }));
     }
+
+    /// [Appends](Self::append) all parts in order, in memory for no more points than theirs.
+    ///
+    /// # Panics
+    /// If parts with points differ in their origins.
+    #[must_use]
+    pub fn joined<'a>(parts: impl Iterator<Item = &'a Self> + Clone) -> Self {
+        let total: usize = parts.clone().map(Self::len).sum();
+        let mut parts = parts.filter(|part| !part.is_empty());
+        let mut all = parts.next().cloned().unwrap_or_default();
+        let more = total - all.len();
+        all.positions.reserve_exact(more);
+        if let Some(residuals) = &mut all.residuals {
+            residuals.reserve_exact(more);
+        }
+        if let Some(colors) = &mut all.colors {
+            colors.reserve_exact(more);
+        }
+        for field in &mut all.fields {
+            each_type!(&mut field.values, v => v.reserve_exact(more));
+        }
+        parts.for_each(|part| all.append(part.clone()));
+        all
+    }
 }
 
 fn append_values<T: Copy + Default>(all: &mut Option<Vec<T>>, other: Option<Vec<T>>, before: usize, added: usize) {
@@ -119,6 +143,11 @@ mod tests {
         assert_eq!(values("A"), Some(&FieldValues::F64(vec![1.0, 2.0, 0.0, 0.0, 0.5, 1.5])), "of two types");
         assert_eq!(values("B"), Some(&FieldValues::I32(vec![0, 0, 0, 0, -3, 4])));
         assert_eq!(cloud.axes(), Some(Axes::ZUp));
+        let parts = [PointCloud::default(), part(5.0), cloud.clone(), part(6.0)];
+        let mut one_by_one = PointCloud::default();
+        parts.iter().for_each(|part| one_by_one.append(part.clone()));
+        assert_eq!(PointCloud::joined(parts.iter()), one_by_one);
+        assert_eq!(PointCloud::joined([].iter()), PointCloud::default());
         let mut empty = PointCloud::default();
         empty.append(cloud.clone());
         assert_eq!(empty, cloud, "the first part");

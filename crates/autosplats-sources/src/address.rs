@@ -12,6 +12,9 @@ const SCHEMES: [&str; 5] = ["http://", "https://", "s3://", "gs://", "az://"];
 /// Name of the file that describes an octree of many files.
 const EPT: &str = "ept.json";
 
+/// Octrees of fewer points in files are read whole, since that takes no longer than choosing a part.
+pub const MIN_TREE_POINTS: u64 = 20_000_000;
+
 /// Whether a name is the address of a file.
 pub(crate) fn is_address(name: &str) -> bool {
     let start = name.split_once("://").map(|(scheme, _)| scheme.to_ascii_lowercase() + "://");

@@ -29,7 +29,7 @@ mod stream;
 mod transforms;
 mod wire;
 
-pub use address::read_tree;
+pub use address::{MIN_TREE_POINTS, read_tree};
 pub use align::beginnings;
 pub use animation::{Animation, Playback};
 pub use input::Input;

@@ -32,6 +32,8 @@ use eframe::egui;
 
 pub use autosplats_sources::Input;
 
+pub use session::TreeOptions;
+
 /// Options at the start of the viewer.
 #[derive(Debug, Default)]
 pub struct Options {
@@ -43,6 +45,8 @@ pub struct Options {
     pub watch: bool,
     /// Backend for rendering; `None` keeps that of the last start.
     pub backend: Option<Backend>,
+    /// How much of octrees is read.
+    pub trees: TreeOptions,
 }
 
 /// Why no window could be opened.
@@ -78,7 +82,7 @@ pub fn run(options: Options) -> Result<(), Error> {
     let viewport = egui::ViewportBuilder::default()
         .with_app_id("autosplats")
         .with_title("autosplats")
-        .with_inner_size([1280.0, 800.0])
+        .with_inner_size(session::START_SIZE.map(|side| side as f32))
         .with_min_inner_size([640.0, 400.0])
         .with_drag_and_drop(true);
     let native =

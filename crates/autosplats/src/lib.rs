@@ -46,7 +46,9 @@ mod test_clouds;
 
 pub use autosplats_cloud as cloud;
 pub use camera::{Camera, Lens, Projection, ViewDirection, guess_axes};
-pub use detail::{Choice, Detail, NodePoints, PlacedTree, Shown, TreeScene, choose, choose_loading, load_nodes};
+pub use detail::{
+    Choice, Coarsest, Detail, NodePoints, PlacedTree, Shown, TreeScene, choose, choose_loading, load_nodes,
+};
 pub use error::{Error, MAX_SIDE};
 pub use gpu::{AdapterSummary, PassTime, adapters};
 pub use normals::{NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{InputArgs, RunArgs};
+use super::{InputArgs, RunArgs, TreeArgs};
 use crate::choices::Backend;
 use crate::exit::EXIT_CODES;
 
@@ -14,6 +14,7 @@ Examples:
   autosplats view a.e57 b.e57 --pose b.e57=b.txt
   autosplats view result.ply --watch
   autosplats scene:statue:1M
+  autosplats https://example.org/survey.copc.laz
   autosplats drive.mcap --decay 1s
   autosplats 'scans/frame_*.ply' --fps 25
   producer | autosplats view -
@@ -28,7 +29,8 @@ pub(crate) struct ViewArgs {
         value_name = "INPUT",
         help = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
-generated scene as scene:NAME[:COUNT][@SECONDS]. For points that move: a folder, a quoted file pattern, a recording \
+generated scene as scene:NAME[:COUNT][@SECONDS]. Also an address (https://, s3:// …). Of large COPC and EPT, what the \
+view needs is read. For points that move: a folder, a quoted file pattern, a recording \
 (.mcap .bag), or - for PLY and PCD on standard input. Without an input the window opens empty; drop files on it."
     )]
     pub(crate) inputs: Vec<String>,
@@ -43,6 +45,8 @@ generated scene as scene:NAME[:COUNT][@SECONDS]. For points that move: a folder,
     /// Device that renders; pictures are the same except for rounding [default: as last time, at first auto]
     #[arg(long, value_enum)]
     pub(crate) backend: Option<Backend>,
+    #[command(flatten)]
+    pub(crate) tree: TreeArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }

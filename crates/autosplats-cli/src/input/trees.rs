@@ -7,7 +7,7 @@ use autosplats::PlacedTree;
 use autosplats_cloud::glam::{DMat4, DVec3};
 use autosplats_cloud::{Error, PointCloud};
 use autosplats_formats::Part;
-use autosplats_sources::{Input, read_tree};
+use autosplats_sources::{Input, MIN_TREE_POINTS, read_tree};
 
 use super::distant::note_distant_inputs;
 use super::{Inputs, failure, is_made, read_whole};
@@ -15,9 +15,6 @@ use crate::args::PartArgs;
 use crate::console::Console;
 use crate::exit::Failure;
 use crate::progress::Bar;
-
-/// Files of fewer points are read whole, since that takes no longer than choosing.
-const MIN_TREE_POINTS: u64 = 20_000_000;
 
 impl Inputs {
     /// Reads a part of all inputs into one cloud, which may be empty. Returns the number of points of which it is a

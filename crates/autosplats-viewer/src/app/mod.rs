@@ -6,7 +6,7 @@ mod picture;
 use eframe::egui;
 
 use crate::Options;
-use crate::session::{Session, StoredInput};
+use crate::session::{Session, StoredInput, refuse_edits};
 use crate::ui::Ui;
 use crate::view::{Look, Outcome, Purpose, State, View, storage};
 
@@ -22,8 +22,9 @@ impl App {
     pub(crate) fn new(options: Options, look: Look, recent: Vec<StoredInput>, context: &egui::Context) -> Self {
         let ui = Ui::new(context);
         let messages = ui.messages.sender();
-        let session = Session::new(options.state, options.watch, recent, messages.clone(), context);
-        let mut app = Self { session, view: View::new(look, messages, context), ui };
+        let session = Session::new(options.state, options.watch, recent, options.trees, messages.clone(), context);
+        let view = View::new(look, session.trees.handle(), messages, context);
+        let mut app = Self { session, view, ui };
         if let Some(backend) = options.backend {
             app.view.look.backend = backend;
         }
@@ -37,6 +38,9 @@ impl App {
         let arrival = self.session.follow(now);
         self.view.follow(&self.session, arrival);
         self.view.receive(now).into_iter().for_each(|outcome| self.done(outcome));
+        if let Some(point) = self.session.inspected() {
+            self.ui.tools.complete(point);
+        }
     }
 
     /// Applies the outcome of a task.
@@ -47,8 +51,11 @@ impl App {
                     self.view.navigation.set_pivot(seen.surface);
                 }
             }
-            Outcome::Picked { purpose, point } => self.ui.tools.picked(&self.session, purpose, point),
+            Outcome::Picked { purpose, point } => self.ui.tools.picked(&mut self.session, purpose, point),
             Outcome::Selected { shown, hits, mode } => {
+                if shown.hits_tree(|i| hits[i]) {
+                    refuse_edits(&self.session.messages);
+                }
                 self.session.change(|document| document.select(&shown, |i| hits[i], mode));
             }
             Outcome::Photographed { image, range, goal } => self.view.photographed(*image, range, goal),

@@ -5,7 +5,7 @@ use autosplats::{Camera, ViewDirection};
 use eframe::egui;
 
 use super::App;
-use crate::session::{Document, LayerId};
+use crate::session::{Document, LayerId, refuse_edits};
 use crate::ui::{Action, Command, Pose, Tool};
 
 impl App {
@@ -110,6 +110,9 @@ impl App {
             },
             Command::SelectAll | Command::InvertSelection => {
                 if let Some(shown) = view.shown(session) {
+                    if shown.hits_tree(|_| true) {
+                        refuse_edits(&session.messages);
+                    }
                     session.change(|document| {
                         if command == Command::SelectAll {
                             document.select_all(&shown);

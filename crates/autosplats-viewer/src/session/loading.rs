@@ -12,8 +12,9 @@ use autosplats_formats::{ReadOptions, read_marked};
 use autosplats_sources::Source;
 use eframe::egui;
 
-use crate::session::document::Bits;
-use crate::session::{FirstLook, Input, SharedViewFrame, ViewFrame};
+use crate::session::document::{Bits, LayerTree};
+use crate::session::trees::TreeOpener;
+use crate::session::{FirstLook, Input, SharedViewFrame, TreeOptions, ViewFrame};
 use crate::threads::spawn;
 
 /// Largest number of points shown before a file is read to its end.
@@ -31,6 +32,8 @@ pub(crate) enum JobNews {
     Preview(Arc<PointCloud>, FirstLook),
     /// All points, the reader's notes, and the points to hide.
     Read(Arc<PointCloud>, FirstLook, Vec<String>, Bits),
+    /// An octree, of which the coarsest points are read, and the reader's notes.
+    Opened(LayerTree, Arc<PointCloud>, FirstLook, Vec<String>),
     /// Why reading failed.
     Failed(String),
     /// The job was cancelled.
@@ -84,7 +87,8 @@ struct Order {
 
 impl Loader {
     /// Starts the reading thread. `context` is asked for a repaint with each piece of news.
-    pub(crate) fn start(context: egui::Context) -> Self {
+    pub(crate) fn start(trees: &TreeOptions, context: egui::Context) -> Self {
+        let mut opener = TreeOpener::new(trees);
         let (orders, queue) = channel::<Order>();
         let (sender, receiver) = channel();
         let asked = context.clone();
@@ -92,7 +96,7 @@ impl Loader {
         let known = frame.clone();
         spawn("read", move || {
             for order in queue {
-                let work = std::panic::AssertUnwindSafe(|| read(&order, &known, &sender, &asked));
+                let work = std::panic::AssertUnwindSafe(|| read(&order, &mut opener, &known, &sender, &asked));
                 let read = std::panic::catch_unwind(work);
                 // A panic in one file must not stop the following files.
                 let news = read.unwrap_or_else(|_| {
@@ -140,13 +144,13 @@ impl Loader {
             let Some(at) = self.jobs.iter().position(|job| job.id == id) else { continue };
             let input = self.jobs[at].input.clone();
             let cancelled = self.jobs[at].state.cancelled.load(Ordering::Relaxed);
-            if matches!(news, JobNews::Read(..) | JobNews::Failed(_) | JobNews::Cancelled) {
+            if !matches!(news, JobNews::Preview(..)) {
                 self.jobs.remove(at);
             }
             // A job that finished before the reader saw the cancellation counts as cancelled.
             match news {
                 JobNews::Preview(..) if cancelled => {}
-                JobNews::Read(..) if cancelled => told.push((input, id, JobNews::Cancelled)),
+                JobNews::Read(..) | JobNews::Opened(..) if cancelled => told.push((input, id, JobNews::Cancelled)),
                 news => told.push((input, id, news)),
             }
         }
@@ -198,12 +202,29 @@ pub(crate) fn read_options(input: &Input) -> ReadOptions {
     ReadOptions { exact: true, keep, ..input.options.clone() }
 }
 
-fn read(order: &Order, frame: &SharedViewFrame, sender: &Sender<(JobId, JobNews)>, context: &egui::Context) -> JobNews {
+fn read(
+    order: &Order,
+    opener: &mut TreeOpener,
+    frame: &SharedViewFrame,
+    sender: &Sender<(JobId, JobNews)>,
+    context: &egui::Context,
+) -> JobNews {
     if order.state.cancelled.load(Ordering::Relaxed) {
         return JobNews::Cancelled;
     }
     let follower = Follower { order, frame, sender, context, notes: Mutex::default(), preview: Mutex::default() };
     let options = read_options(&order.input);
+    match opener.open(&order.input, &options, &follower) {
+        Ok(None) => {}
+        Ok(Some(open)) => {
+            let notes = follower.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
+            let glance = FirstLook::of(&order.input, &open.sample, &Bits::default(), frame.get());
+            let (tree, cloud) = open.coarsest();
+            return JobNews::Opened(tree, cloud, glance, notes);
+        }
+        Err(None) => return JobNews::Cancelled,
+        Err(Some(why)) => return JobNews::Failed(why),
+    }
     let read = match &order.input.source {
         // What is left out is hidden, so that an export of the whole file still has it.
         Source::File(path) => read_marked(path, &options, &follower),

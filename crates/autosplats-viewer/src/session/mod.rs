@@ -9,6 +9,7 @@ mod loading;
 pub(crate) mod measure;
 mod opening;
 mod playing;
+mod trees;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -30,6 +31,8 @@ pub(crate) use self::loading::{JobId, JobNews, Loader, Watch, read_options};
 pub(crate) use self::measure::Ruler;
 pub(crate) use self::opening::{Arrival, JobTarget};
 pub(crate) use self::playing::{Clock, Playing, Reel, SPEEDS, WaitingInput};
+pub use self::trees::TreeOptions;
+pub(crate) use self::trees::{START_SIZE, Sight, TreeHandle, TreeStatus, Trees, refuse_edits};
 use crate::messages::MessageSender;
 
 /// What is open.
@@ -46,6 +49,7 @@ pub(crate) struct Session {
     /// The watched files, which are read again when they change; `None` watches none.
     watches: Option<HashMap<PathBuf, Watch>>,
     pub(crate) playing: Playing,
+    pub(crate) trees: Trees,
     /// The input that each layer was read from.
     pub(crate) inputs: HashMap<LayerId, Input>,
     /// Inputs that could not be read. A session keeps them.
@@ -70,6 +74,7 @@ impl Session {
         file: Option<PathBuf>,
         watch: bool,
         recent: Vec<StoredInput>,
+        trees: TreeOptions,
         messages: MessageSender,
         context: &egui::Context,
     ) -> Self {
@@ -78,10 +83,11 @@ impl Session {
             version: 1,
             counted: CachedCounts::default(),
             clip_before: None,
-            loader: Loader::start(context.clone()),
+            loader: Loader::start(&trees, context.clone()),
             jobs: HashMap::new(),
             watches: watch.then(HashMap::new),
             playing: Playing::default(),
+            trees: Trees::start(trees, context),
             inputs: HashMap::new(),
             failed: Vec::new(),
             recent,

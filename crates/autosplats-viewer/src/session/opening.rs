@@ -6,7 +6,7 @@ use std::sync::Arc;
 use autosplats::cloud::{PointCloud, PointFilter};
 use autosplats_sources::Source;
 
-use crate::session::document::Bits;
+use crate::session::document::{Bits, LayerTree};
 use crate::session::{Appearance, FirstLook, Input, JobId, JobNews, Layer, LayerId, Session, StoredInput};
 
 /// Number of recent inputs kept.
@@ -83,6 +83,7 @@ impl Session {
     /// Receives what has been read and played up to window time `now`, seconds. Returns what has arrived.
     pub(crate) fn follow(&mut self, now: f64) -> Arrival {
         self.follow_files();
+        self.follow_trees();
         self.follow_streams(now);
         std::mem::take(&mut self.arrival)
     }
@@ -115,6 +116,10 @@ impl Session {
                         self.examined(id, glance);
                     }
                 }
+                JobNews::Opened(tree, cloud, glance, notes) => {
+                    notes.into_iter().for_each(|note| self.messages.note(format!("{}: {note}", input.name)));
+                    self.open_tree(&input, job, &tree, &cloud, glance);
+                }
                 JobNews::Failed(why) => {
                     self.messages.error(why);
                     let appearance = self.forget_job(job);
@@ -133,6 +138,33 @@ impl Session {
         }
         let changed: Vec<PathBuf> = self.loader.changed().collect();
         changed.iter().for_each(|path| self.reload(path));
+    }
+
+    /// Shows the coarsest points of an octree. Edits made while it was opened again are kept, and the octree dropped.
+    fn open_tree(&mut self, input: &Input, job: JobId, tree: &LayerTree, cloud: &Arc<PointCloud>, glance: FirstLook) {
+        let id = match self.jobs.remove(&job) {
+            Some(JobTarget::Again(id) | JobTarget::Growing(id)) => {
+                if self.history.is_unsaved(id) {
+                    self.tell_kept_edits(input);
+                    return;
+                }
+                if self.document().layer(id).is_none() {
+                    return;
+                }
+                self.messages.note(format!("{} was opened again", input.name));
+                self.inputs.insert(id, input.clone());
+                id
+            }
+            Some(JobTarget::New(appearance)) => self.add_layer(input, cloud, appearance, false),
+            None => return,
+        };
+        self.settle(|document| document.set_tree(id, tree, cloud));
+        self.examined(id, glance);
+    }
+
+    fn tell_kept_edits(&self, input: &Input) {
+        let name = &input.name;
+        self.messages.note(format!("{name} has changed; its new points are not shown, because it has unsaved edits"));
     }
 
     /// Puts the points of a job into its layer, which the first points create. Undo does not revert this. Returns the
@@ -251,10 +283,7 @@ impl Session {
     /// Shows the new points of a file. Edits made meanwhile apply to the old points, so that the new ones are dropped.
     fn read_again(&mut self, input: &Input, id: LayerId, cloud: &Arc<PointCloud>, glance: FirstLook, hidden: &Bits) {
         if self.history.is_unsaved(id) {
-            self.messages.note(format!(
-                "{} has changed; its new points are not shown, because it has unsaved edits",
-                input.name
-            ));
+            self.tell_kept_edits(input);
         } else if self.document().layer(id).is_some() {
             self.fill(id, cloud);
             self.settle(|document| document.set_hidden(id, hidden));
@@ -284,7 +313,8 @@ impl Session {
     /// again.
     pub(crate) fn keep(&mut self, id: LayerId, filter: PointFilter) {
         let Some(input) = self.inputs.get_mut(&id) else { return };
-        if filter.is_all() && !input.moves() {
+        let is_tree = self.history.current().layer(id).is_some_and(|layer| layer.tree.is_some());
+        if filter.is_all() && !input.moves() && !is_tree {
             input.options.keep = Some(filter);
             self.settle(|document| document.set_hidden(id, &Bits::default()));
             return;

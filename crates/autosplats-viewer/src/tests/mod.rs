@@ -9,6 +9,7 @@ mod opening;
 mod rest;
 mod shortcuts;
 mod soak;
+mod trees;
 
 use std::time::{Duration, Instant};
 
@@ -51,9 +52,13 @@ impl Window {
 
     /// A window that renders on a backend.
     fn on(backend: Backend, names: &[&str]) -> Self {
+        Self::of(Options { backend: Some(backend), ..Options::default() }, names)
+    }
+
+    /// A window with options.
+    fn of(options: Options, names: &[&str]) -> Self {
         let parse = |name: &&str| Input::parse(name).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let options =
-            Options { inputs: names.iter().map(parse).collect(), backend: Some(backend), ..Options::default() };
+        let options = Options { inputs: names.iter().map(parse).collect(), ..options };
         let builder = Harness::builder().with_size(SMALL).with_step_dt(1.0 / 60.0).with_max_steps(2);
         let builder = builder.with_accessibility_check(false).with_os(egui::os::OperatingSystem::Nix);
         let harness =
@@ -102,7 +107,8 @@ impl Window {
         self.steps(2);
         self.until("the picture is whole", |window| {
             let app = window.app();
-            let asked = app.session.loader.jobs().is_empty() && !app.view.navigation.is_moving();
+            let asked =
+                app.session.loader.jobs().is_empty() && !app.view.navigation.is_moving() && app.session.trees.is_idle();
             let empty = app.session.document().layers.is_empty() && app.view.shot.is_none();
             asked
                 && (empty

@@ -112,7 +112,7 @@ impl Tools {
     }
 
     /// Receives the point under a click.
-    pub(crate) fn picked(&mut self, session: &Session, purpose: Purpose, point: Option<PickHit>) {
+    pub(crate) fn picked(&mut self, session: &mut Session, purpose: Purpose, point: Option<PickHit>) {
         let Some(seen) = point else {
             if purpose == Purpose::Inspect {
                 self.inspected = None;
@@ -121,12 +121,25 @@ impl Tools {
         };
         let described = session.document().describe(&seen.shown, seen.index);
         match (purpose, described) {
-            (Purpose::Inspect, described) => self.inspected = described,
+            (Purpose::Inspect, described) => {
+                if let Some(point) = &described {
+                    session.inspect(point, &seen.shown);
+                }
+                self.inspected = described;
+            }
             // The second click of a double click hits the same point.
             (Purpose::Measure, Some(described)) if self.measured.last() != Some(&described.position) => {
                 self.measured.push(described.position);
             }
             _ => {}
+        }
+    }
+
+    /// Adds the attributes of the inspected point, once they are read.
+    pub(crate) fn complete(&mut self, point: PickedPoint) {
+        let is_same = |shown: &PickedPoint| shown.layer == point.layer && shown.node == point.node;
+        if self.inspected.as_ref().is_some_and(is_same) {
+            self.inspected = Some(point);
         }
     }
 

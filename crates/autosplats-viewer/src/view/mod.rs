@@ -31,6 +31,7 @@ pub(crate) use self::screen::OnScreen;
 pub(crate) use self::state::State;
 pub(crate) use self::turns::Turns;
 use crate::messages::MessageSender;
+use crate::session::TreeHandle;
 
 /// The camera and its pictures.
 pub(crate) struct View {
@@ -58,6 +59,8 @@ pub(crate) struct View {
     moved_by_preview: bool,
     /// Time of the last movement, seconds.
     moved: f64,
+    /// Number of points that a picture can have while the view moves, as far as known.
+    moving_points: usize,
     /// Key cameras of a film.
     pub(crate) keys: Vec<Camera>,
     pub(crate) recording: Option<Recording>,
@@ -72,9 +75,9 @@ pub(crate) struct View {
 
 impl View {
     /// A view of nothing. `context` is asked for a repaint with each picture.
-    pub(crate) fn new(look: Look, messages: MessageSender, context: &egui::Context) -> Self {
+    pub(crate) fn new(look: Look, trees: TreeHandle, messages: MessageSender, context: &egui::Context) -> Self {
         Self {
-            render: RenderThread::start(context.clone()),
+            render: RenderThread::start(trees, context.clone()),
             navigation: Navigation::new(),
             look,
             shot: None,
@@ -88,6 +91,7 @@ impl View {
             awaited: false,
             moved_by_preview: false,
             moved: 0.0,
+            moving_points: usize::MAX,
             keys: Vec::new(),
             recording: None,
             format: None,

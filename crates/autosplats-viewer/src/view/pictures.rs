@@ -7,7 +7,7 @@ use autosplats::cloud::Axes;
 use eframe::egui;
 
 use super::View;
-use crate::session::{Session, ShownCloud};
+use crate::session::{Session, ShownCloud, Sight};
 use crate::view::{Answer, Flight, Look, Outcome, Purpose, RenderRequest, Task};
 
 /// Seconds from the last movement until the whole picture is rendered.
@@ -50,6 +50,7 @@ impl View {
             Answer::Picture(picture) => {
                 self.rate.count(now, &picture);
                 self.failure = None;
+                self.moving_points = picture.most_points.unwrap_or(self.moving_points);
                 self.shot = Some(picture);
             }
             Answer::Finer(image) => {
@@ -78,8 +79,11 @@ impl View {
             settings: self.look.settings.clone(),
             dots: self.look.dots.then_some(self.look.dot_size),
             backend: self.look.backend,
-            // A playing input keeps one up axis; a guess per frame could change from frame to frame.
-            axes: session.up_axis.or(session.guessed_axes.filter(|_| !session.playing.is_empty())),
+            // Points that change keep one up axis; a guess per frame could change from frame to frame.
+            axes: session.up_axis.or(session
+                .guessed_axes
+                .filter(|_| !session.playing.is_empty() || session.document().trees().next().is_some())),
+            moving_ms: self.look.moving_ms,
             budget_ms: self.shared_budget_ms(session, moving).map(|shared_budget_ms| {
                 self.turns.as_ref().map_or(shared_budget_ms, |turns| turns.budget_ms(shared_budget_ms))
             }),
@@ -127,6 +131,8 @@ impl View {
         }
         let (version, camera, axes) = (session.version, self.navigation.camera(), session.axes());
         let hurried = self.shared_budget_ms(session, moving).is_some();
+        let sight = Sight::new(camera, size, &look.settings.shading.color);
+        session.look(if hurried { sight.moving(self.moving_points) } else { sight });
         let key = RequestKey { version, camera, size, look, axes, hurried };
         if self.wished.as_ref() != Some(&key) {
             self.render.wish(RenderRequest { settings: key.look.settings.clone(), ..self.wish(session, size, moving) });

@@ -199,6 +199,7 @@ mod tests {
             backend,
             axes: None,
             budget_ms: None,
+            moving_ms: 33.0,
         };
         Recording::start(wish, vec![camera; pictures], None, 25, target.clone(), &egui::Context::default())
     }

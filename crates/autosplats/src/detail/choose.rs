@@ -15,6 +15,8 @@ use crate::camera::{Camera, Lens, PICTURE_SIDE_PER_MARGIN, Projection};
 pub struct Choice {
     /// The nodes, in the order of their keys.
     pub nodes: Vec<NodeKey>,
+    /// The same nodes, those that show most first. Fewer [points](Detail::max_points) choose a beginning of them.
+    pub by_need: Vec<NodeKey>,
     /// Number of points of these nodes.
     pub points: u64,
     /// Largest distance on the screen, in pixels, between points to which finer ones exist. It exceeds
@@ -89,7 +91,7 @@ pub fn choose(trees: &[PlacedTree], camera: &Camera, size: [u32; 2], detail: &De
         }
         slots += more;
         choice.points += points;
-        choice.nodes.push(node);
+        choice.by_need.push(node);
         let spacing = tree.info().spacing / f64::from(1u32 << node.key.level);
         for key in node.key.children() {
             // A place without a node is no finer level that is missing.
@@ -100,6 +102,7 @@ pub fn choose(trees: &[PlacedTree], camera: &Camera, size: [u32; 2], detail: &De
             }
         }
     }
+    choice.nodes.clone_from(&choice.by_need);
     choice.nodes.sort_unstable();
     choice.unknown.sort_unstable();
     Ok(choice)

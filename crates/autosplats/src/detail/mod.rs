@@ -15,12 +15,12 @@ mod tests;
 
 use std::sync::Arc;
 
-use autosplats_cloud::Tree;
+use autosplats_cloud::{SLOT_POINTS, Tree};
 use glam::DMat4;
 
 pub use choose::{Choice, choose, choose_loading};
 pub use load::{NodePoints, load_nodes};
-pub use scene::{Shown, TreeScene};
+pub use scene::{Coarsest, Shown, TreeScene};
 
 /// How fine points on the screen shall be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +37,16 @@ impl Default for Detail {
     /// One pixel and ten million points. A finer spacing adds nothing that can be seen.
     fn default() -> Self {
         Self { spacing_px: 1.0, max_points: 10_000_000, max_slots: usize::MAX }
+    }
+}
+
+/// Slots beyond those that full ones of a picture take.
+const SPARE_SLOTS: usize = 8;
+
+impl Detail {
+    /// The detail whose pictures have at most `max_points`, in slots of which nodes may leave a fifth empty.
+    pub fn of_points(spacing_px: f64, max_points: usize) -> Self {
+        Self { spacing_px, max_points, max_slots: max_points.div_ceil(SLOT_POINTS).saturating_mul(5) / 4 + SPARE_SLOTS }
     }
 }
 

@@ -5,12 +5,9 @@ use autosplats_cloud::{
 };
 use glam::{DMat4, DVec3};
 
-use super::{Choice, Detail, NodePoints, PlacedTree, choose_loading, load_nodes};
+use super::{Choice, Detail, NodePoints, PlacedTree, SPARE_SLOTS, choose_loading, load_nodes};
 use crate::Error;
 use crate::camera::Camera;
-
-/// Slots beyond those that are needed.
-const SPARE_SLOTS: u64 = 16;
 
 /// Trees, of which the nodes of the last pictures are in memory.
 ///
@@ -56,6 +53,46 @@ pub struct Shown {
     pub damage: Option<String>,
 }
 
+/// The coarsest points of trees: those of the roots and of the nodes below these.
+#[derive(Debug)]
+pub struct Coarsest {
+    /// What is wanted of all nodes: what was asked for, or all points if the usual filter leaves none of the coarsest.
+    pub wanted: Wanted,
+    /// The nodes, in the order of their keys, each with the columns that any of the trees has. None if finer nodes
+    /// alone may have what the filter keeps.
+    pub nodes: Vec<(NodeKey, PointCloud)>,
+    /// Points that stand for all of the trees. Where there are no `nodes`, these are points that the filter leaves out.
+    pub sample: PointCloud,
+}
+
+impl Coarsest {
+    /// Reads the coarsest points.
+    ///
+    /// # Errors
+    /// Those of reading; [`Error::NothingVisible`] if there are no points.
+    pub fn load(trees: &[PlacedTree], wanted: Wanted, progress: &dyn Progress) -> Result<Self, Error> {
+        let mut wanted = wanted;
+        let mut nodes = coarsest(trees, &wanted, progress)?;
+        let mut sample = sample_of(trees, &nodes);
+        if let Some(filter) = wanted.keep.clone().filter(|_| !sample.has_finite(1)) {
+            // Finer nodes may have what the filter keeps. All points tell where to look.
+            let all = Wanted { keep: None, ..wanted.clone() };
+            nodes = coarsest(trees, &all, progress)?;
+            sample = sample_of(trees, &nodes);
+            if filter.is_usual() {
+                progress.note("all of the coarsest points are noise or withheld, so such points are kept");
+                wanted = all;
+            } else {
+                nodes.clear();
+            }
+        }
+        if !sample.has_finite(1) {
+            return Err(Error::NothingVisible("the coarsest points have no finite coordinates".into()));
+        }
+        Ok(Self { wanted, nodes, sample })
+    }
+}
+
 impl TreeScene {
     /// Reads the coarsest points of trees, and reserves up to `memory` bytes for the points of pictures, which have at
     /// most `max_points` each.
@@ -70,28 +107,11 @@ impl TreeScene {
         max_points: usize,
         progress: &dyn Progress,
     ) -> Result<Self, Error> {
-        let mut wanted = wanted;
-        let mut first = coarsest(&trees, &wanted, progress)?;
-        let mut sample = sample_of(&trees, &first);
-        if let Some(filter) = wanted.keep.clone().filter(|_| !sample.has_finite(1)) {
-            // Finer nodes may have what the filter keeps. All points tell where to look.
-            let all = Wanted { keep: None, ..wanted.clone() };
-            first = coarsest(&trees, &all, progress)?;
-            sample = sample_of(&trees, &first);
-            if filter.is_usual() {
-                progress.note("all of the coarsest points are noise or withheld, so such points are kept");
-                wanted = all;
-            } else {
-                first.clear();
-            }
-        }
-        if !sample.has_finite(1) {
-            return Err(Error::NothingVisible("the coarsest points have no finite coordinates".into()));
-        }
+        let Coarsest { wanted, nodes: first, sample } = Coarsest::load(&trees, wanted, progress)?;
         let fits = memory / PointPool::bytes_per_point(&sample) as u64 / SLOT_POINTS as u64;
-        // Every picture may use half of the slots. A quarter of them may be lost by nodes that fill none.
-        let needed = (max_points as u64).div_ceil(SLOT_POINTS as u64).saturating_mul(5) / 2 + SPARE_SLOTS;
-        let all = slots_of_all(&trees).map_or(u64::MAX, |slots| 2 * slots + SPARE_SLOTS);
+        // Every picture may use half of the slots.
+        let needed = 2 * Detail::of_points(1.0, max_points).max_slots as u64;
+        let all = slots_of_all(&trees).map_or(u64::MAX, |slots| 2 * (slots + SPARE_SLOTS as u64));
         let most = u64::from(u32::MAX) / SLOT_POINTS as u64 - 1;
         let capacity = fits.min(needed).min(all).min(most) * SLOT_POINTS as u64;
         let mut pool = PointPool::new(&sample, capacity as usize)?;

@@ -214,6 +214,7 @@ fn a_budget_leaves_out_the_finest_everywhere() {
         assert!(choice.points < all.points && choice.spacing_px > 0.5, "{max_points} is not enough");
         // What fewer points show, more points show too; and they are what that spacing alone asks for.
         assert!(before.nodes.iter().all(|node| choice.nodes.contains(node)), "more points, more nodes");
+        assert!(choice.by_need.starts_with(&before.by_need), "in one order");
         if choice.nodes.len() > 1 {
             let same = choose_loading(&trees, &camera, size, &detail(choice.spacing_px), &()).expect("a choice");
             assert!(same.nodes.iter().all(|node| choice.nodes.contains(node)), "no finer node was preferred");

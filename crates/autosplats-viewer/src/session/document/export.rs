@@ -3,12 +3,14 @@
 use std::{
     borrow::Cow,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_memory, glam::DMat4};
-use autosplats_formats::{check_writable, write};
+use autosplats_formats::{ReadOptions, check_writable, write};
+use autosplats_sources::read_tree;
 
-use super::{Document, Layer, LayerId, shown::points_where};
+use super::{Document, Layer, LayerId, LayerTree, shown::points_where, tree::part_in};
 
 /// Which points to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,6 +84,7 @@ impl From<Error> for ExportError {
 
 /// Writes points in the format given by the extension of `path`. Deleted points are left out; moves and poses are
 /// applied. Attributes, scans, coordinate system and coordinate resolution stay as read. Colours are the points' own.
+/// Octrees are read in full detail: the visible points are those inside the clipping box, wherever the view is.
 ///
 /// Several layers become one cloud by [merging](PointCloud::merge). Layers in degrees stay in degrees, unless other
 /// layers are not; then all are written in metres, as shown. Losses are reported to `progress`. The file appears
@@ -98,6 +101,7 @@ pub(crate) fn export(
 ) -> Result<Exported, ExportError> {
     check_writable(path)?;
     check_target(document, path, replace)?;
+    let document = &with_trees_read(document, what, progress)?;
     let layers = document.layers.iter().filter(|layer| match what {
         ExportScope::Shown | ExportScope::Selected => layer.visible,
         ExportScope::Layer(id) => layer.id == id,
@@ -128,6 +132,26 @@ pub(crate) fn export(
     };
     write(&cloud, path, progress)?;
     Ok(Exported { points: cloud.len() })
+}
+
+/// The document with all points of its octrees that `what` may choose, which the layers have in part only.
+fn with_trees_read(document: &Document, what: ExportScope, progress: &dyn Progress) -> Result<Document, Error> {
+    let mut document = document.clone();
+    let is_shown = what == ExportScope::Shown;
+    let clip = document.clip.filter(|clip| is_shown && clip.enabled);
+    for layer in &mut document.layers {
+        let written = match what {
+            ExportScope::Shown => layer.visible,
+            ExportScope::Selected => false,
+            ExportScope::Layer(id) => layer.id == id,
+            ExportScope::All => true,
+        };
+        let Some(LayerTree { open, .. }) = layer.tree.take().filter(|_| written) else { continue };
+        let keep = open.options.keep.clone().filter(|_| is_shown);
+        let options = ReadOptions { exact: true, keep, ..open.options.clone() };
+        layer.cloud = Arc::new(read_tree(&*open.tree, &part_in(clip.as_ref(), &layer.pose), &options, progress)?);
+    }
+    Ok(document)
 }
 
 /// The points of a layer to write; `None` for all.

@@ -13,7 +13,7 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::{Bits, bounds::bounds};
+use super::{Bits, LayerTree, bounds::bounds};
 
 /// Identifies a layer in this process. Clones of a layer, as undo keeps them, have the same id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -27,8 +27,11 @@ pub(crate) struct Layer {
     pub(crate) name: String,
     /// The file that the points were read from.
     pub(crate) path: Option<PathBuf>,
-    /// The points as read, with [all digits](autosplats_formats::ReadOptions::exact). They never change.
+    /// The points as read, with [all digits](autosplats_formats::ReadOptions::exact). They never change, except those
+    /// of an octree, which have the digits of the picture.
     pub(crate) cloud: Arc<PointCloud>,
+    /// The octree of which the cloud holds what the view needs.
+    pub(crate) tree: Option<LayerTree>,
     pub(crate) visible: bool,
     /// Whether points are still to come or to change. Incomplete points can be seen, but not selected or edited.
     pub(crate) incomplete: bool,
@@ -88,6 +91,7 @@ impl Layer {
             path,
             local: cloud.local_metres(None),
             cloud,
+            tree: None,
             visible: true,
             incomplete: false,
             tint: None,
@@ -130,6 +134,10 @@ impl Layer {
 
     /// Bounds of the points that are neither hidden nor deleted, world coordinates.
     pub(crate) fn bounds(&self) -> Option<[DVec3; 2]> {
+        self.tree_bounds().or_else(|| self.loaded_bounds())
+    }
+
+    fn loaded_bounds(&self) -> Option<[DVec3; 2]> {
         bounds(self.cloud.len(), |point| self.has(point).then(|| self.position(point)))
     }
 

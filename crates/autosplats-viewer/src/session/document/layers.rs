@@ -70,7 +70,7 @@ impl Document {
         self.change(id, |layer| {
             // A layer that is still in degrees keeps its map.
             layer.local = cloud.local_metres(layer.local.as_ref());
-            (layer.cloud, layer.edits) = (Arc::clone(cloud), Edits::default());
+            (layer.cloud, layer.edits, layer.tree) = (Arc::clone(cloud), Edits::default(), None);
         });
     }
 
@@ -100,7 +100,8 @@ impl Document {
     }
 
     fn part_of(&self, has: impl Fn(&Layer, usize) -> bool) -> PointCloud {
-        let visible = || self.layers.iter().filter(|layer| layer.visible);
+        let sampled: Vec<Layer> = self.layers.iter().map(Layer::as_sampled).collect();
+        let visible = || sampled.iter().filter(|layer| layer.visible);
         let total: usize = visible().map(|layer| layer.cloud.len()).sum();
         let step = total.div_ceil(OVERVIEW_POINT_COUNT).max(1);
         let clip = self.clip.as_ref().filter(|clip| clip.enabled);

@@ -13,6 +13,9 @@
 //! An edit changes visible points only. Points that are hidden, outside the clipping box or in an invisible layer do
 //! not change, even if they are selected.
 //!
+//! The cloud of an octree's layer is replaced as the view changes, because it holds what the view needs alone. So such
+//! points cannot be edited; an export reads them anew.
+//!
 //! Clouds in degrees are shown in metres, on one [map](autosplats::cloud::LocalMetres) per document. Poses and moves
 //! are in these metres; exported coordinates are in degrees again.
 
@@ -30,6 +33,7 @@ mod select;
 mod shown;
 #[cfg(test)]
 mod tests;
+mod tree;
 
 pub(crate) use self::{
     bits::Bits,
@@ -44,6 +48,7 @@ pub(crate) use self::{
     region::Region,
     select::SelectMode,
     shown::ShownCloud,
+    tree::{LayerTree, OpenTree},
 };
 
 /// The open layers and the clipping box. Clones share all large parts.

@@ -1,10 +1,10 @@
 //! Information on a picked point.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
-use autosplats::cloud::{FieldValues, PointCloud, glam::DVec3};
+use autosplats::cloud::{Error, Field, FieldValues, Key, PointCloud, Progress, Wanted, glam::DVec3};
 
-use super::{Document, LayerId, ShownCloud};
+use super::{Document, Layer, LayerId, LayerTree, ShownCloud};
 
 /// A picked point.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +15,8 @@ pub(crate) struct PickedPoint {
     pub(crate) path: Option<PathBuf>,
     /// Index of the point among those kept in reading, from 0.
     pub(crate) point: usize,
+    /// For an octree, the node and the index among its points that are shown.
+    pub(crate) node: Option<(Key, usize)>,
     /// World coordinates, with all edits.
     pub(crate) position: DVec3,
     /// Coordinates in the file.
@@ -33,21 +35,57 @@ impl Document {
     /// Information on the shown point `index`; `None` if the point no longer exists.
     pub(crate) fn describe(&self, shown: &ShownCloud, index: usize) -> Option<PickedPoint> {
         let (id, point) = shown.point(index)?;
-        let layer = self.layer(id).filter(|layer| point < layer.cloud.len())?;
-        let cloud = &layer.cloud;
-        let scan = cloud.scans().iter().find(|scan| scan.points.contains(&point));
-        Some(PickedPoint {
+        // The points of an octree may have been replaced since.
+        let own = self.layer(id)?;
+        let layer = if own.tree.is_some() { shown.layer(id)? } else { own };
+        let layer = Some(layer).filter(|layer| point < layer.cloud.len())?;
+        let scan = layer.cloud.scans().iter().find(|scan| scan.points.contains(&point));
+        let mut picked = PickedPoint {
             layer: id,
             name: layer.name.clone(),
             path: layer.path.clone(),
             point,
+            node: layer.tree.as_ref().and_then(|tree| tree.place_of(point)),
             position: layer.position(point),
-            file_position: layer.file_position(point),
-            file_text: file_text(cloud, point),
-            color: cloud.colors().map(|colors| colors[point]),
+            file_position: DVec3::ZERO,
+            file_text: [const { String::new() }; 3],
+            color: None,
             scan: scan.and_then(|scan| scan.name.clone()),
-            fields: cloud.fields().iter().map(|field| (field.name.clone(), value_text(&field.values, point))).collect(),
-        })
+            fields: Vec::new(),
+        };
+        picked.describe(layer, point);
+        Some(picked)
+    }
+}
+
+impl PickedPoint {
+    /// Adds the exact place and all attributes of a point of an octree, from the points of its node as the file has
+    /// them. Blocks while the node is read.
+    ///
+    /// # Errors
+    /// Why the node cannot be read.
+    pub(crate) fn with_attributes(mut self, layer: &Layer, progress: &dyn Progress) -> Result<Self, Error> {
+        let (Some((key, point)), Some(LayerTree { open, .. })) = (self.node, &layer.tree) else { return Ok(self) };
+        let stored = open.tree.fetch(&[key], progress)?.concat();
+        let wanted = Wanted { fields: None, exact: true, ..open.wanted.clone() };
+        let cloud = open.tree.decode(key, &stored, &wanted)?;
+        if point < cloud.len() {
+            let mut layer = layer.clone();
+            layer.cloud = Arc::new(cloud);
+            self.position = layer.position(point);
+            self.describe(&layer, point);
+        }
+        Ok(self)
+    }
+
+    /// Describes a point of a layer.
+    fn describe(&mut self, layer: &Layer, point: usize) {
+        let cloud = &layer.cloud;
+        self.file_position = layer.file_position(point);
+        self.file_text = file_text(cloud, point);
+        self.color = cloud.colors().map(|colors| colors[point]);
+        let field = |field: &Field| (field.name.clone(), value_text(&field.values, point));
+        self.fields = cloud.fields().iter().map(field).collect();
     }
 }
 

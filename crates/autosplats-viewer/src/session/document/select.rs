@@ -20,7 +20,7 @@ impl Document {
     /// Changes the selection by the shown points whose index `hits` accepts. Points that are not shown are not hit.
     pub(crate) fn select(&mut self, shown: &ShownCloud, hits: impl Fn(usize) -> bool + Sync, mode: SelectMode) {
         for layer in &mut self.layers {
-            let part = shown.part(layer.id).filter(|_| !layer.incomplete);
+            let part = shown.part(layer.id).filter(|_| layer.is_editable());
             let hit = part.map(|part| part.bits(layer.cloud.len(), &hits)).unwrap_or_default();
             let selected = &mut layer.edits.selected;
             *selected = match mode {

@@ -71,7 +71,7 @@ impl Document {
 
     /// The layer's points that are selected and visible, which an edit would change.
     pub(super) fn reached(&self, layer: &Layer) -> Bits {
-        if !layer.visible || layer.incomplete {
+        if !layer.visible || !layer.is_editable() {
             return Bits::default();
         }
         let there = layer.edits.selected.without(&layer.edits.hidden).without(&layer.edits.deleted);
@@ -86,7 +86,7 @@ impl Document {
 
     /// The layer's points that are visible and not selected.
     pub(super) fn others(&self, layer: &Layer) -> Bits {
-        if !layer.visible || layer.incomplete {
+        if !layer.visible || !layer.is_editable() {
             return Bits::default();
         }
         let clip = self.clips();
@@ -207,6 +207,57 @@ impl ShownCloud {
         let part = &self.parts[self.parts.partition_point(|part| part.start <= index).checked_sub(1)?];
         let within = index - part.start;
         (within < part.len).then(|| (part.layer, part.point(within)))
+    }
+
+    /// Indices of a part of the points, ascending, that has a half of them for each of the `halvings`: of octrees the
+    /// nodes that show most, of other layers a choice by a hash of the index, so that it is always the same.
+    pub(crate) fn thinned(&self, halvings: u32) -> Vec<u32> {
+        let kept = |index: &u32| {
+            let mixed = index.wrapping_mul(0x9E37_79B9).rotate_left(15).wrapping_mul(0x85EB_CA6B);
+            mixed.checked_shr(32 - halvings).unwrap_or(0) == 0
+        };
+        let mut indices = Vec::new();
+        for part in &self.parts {
+            let tree = self.of.layer(part.layer).and_then(|layer| Some((layer.cloud.len(), layer.tree.as_ref()?)));
+            match tree {
+                Some((len, tree)) => {
+                    let within = |point: usize| match &part.points {
+                        Some(points) => points.partition_point(|&own| (own as usize) < point),
+                        None => point,
+                    };
+                    for points in tree.leading(len, len >> halvings) {
+                        let shown = within(points.start)..within(points.end);
+                        indices.extend(shown.map(|index| (part.start + index) as u32));
+                    }
+                }
+                None => {
+                    let all = part.start as u32..(part.start + part.len) as u32;
+                    indices.par_extend(all.into_par_iter().filter(kept));
+                }
+            }
+        }
+        indices
+    }
+
+    /// Names of the fields that colours can show, those of octrees included, which are read when they are shown.
+    pub(crate) fn field_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.cloud.fields().iter().map(|field| field.name.clone()).collect();
+        for (_, tree) in self.of.trees() {
+            let more: Vec<_> = tree.open.tree.info().fields.iter().filter(|name| !names.contains(name)).collect();
+            names.extend(more.into_iter().cloned());
+        }
+        names
+    }
+
+    /// Whether `hits` accepts a point of an octree, which cannot be selected.
+    pub(crate) fn hits_tree(&self, hits: impl Fn(usize) -> bool) -> bool {
+        let of_tree = |part: &&LayerPart| self.of.layer(part.layer).is_some_and(|layer| layer.tree.is_some());
+        self.parts.iter().filter(of_tree).any(|part| (part.start..part.start + part.len).any(&hits))
+    }
+
+    /// A layer as it was when the cloud was made.
+    pub(crate) fn layer(&self, id: LayerId) -> Option<&Layer> {
+        self.of.layer(id)
     }
 
     pub(super) fn part(&self, layer: LayerId) -> Option<&LayerPart> {

@@ -3,6 +3,7 @@ use std::time::Instant;
 use autosplats::cloud::glam::DVec3;
 
 use super::*;
+use crate::session::TreeOptions;
 
 /// Longer than any machine takes.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -31,7 +32,7 @@ fn files_are_read_and_failures_told() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("points.xyz");
     std::fs::write(&path, rows(1000)).expect("written");
-    let mut loader = Loader::start(egui::Context::default());
+    let mut loader = Loader::start(&TreeOptions::default(), egui::Context::default());
     loader.read(Input::file(path));
     let JobNews::Read(cloud, ..) = last_news(&mut loader) else { panic!("it can be read") };
     assert_eq!(cloud.len(), 1000, "all points");
@@ -43,7 +44,7 @@ fn files_are_read_and_failures_told() {
 
 #[test]
 fn what_waits_can_be_cancelled() {
-    let mut loader = Loader::start(egui::Context::default());
+    let mut loader = Loader::start(&TreeOptions::default(), egui::Context::default());
     let scene = Input::parse("scene:statue:50K").expect("a scene");
     loader.read(scene.clone());
     loader.read(scene);
@@ -74,7 +75,7 @@ fn changes_of_a_file_are_noticed_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("points.xyz");
     std::fs::write(&path, rows(10)).expect("written");
-    let loader = Loader::start(egui::Context::default());
+    let loader = Loader::start(&TreeOptions::default(), egui::Context::default());
     let watch = loader.watch(path.clone());
     // The first check records the state that changes are compared with.
     std::thread::sleep(WATCH_INTERVAL * 2);

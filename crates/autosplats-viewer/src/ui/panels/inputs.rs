@@ -83,7 +83,13 @@ impl Inputs {
             });
             ui.horizontal_wrapped(|ui| {
                 ui.add_space(22.0);
-                let mut figures = format!("{} points", grouped(counts.points));
+                let mut figures = match &layer.tree {
+                    Some(tree) => {
+                        let all = grouped(tree.open.tree.info().points as usize);
+                        format!("{} of {all} points", grouped(counts.points))
+                    }
+                    None => format!("{} points", grouped(counts.points)),
+                };
                 for (count, what) in
                     [(counts.selected, "selected"), (counts.hidden, "hidden"), (counts.deleted, "deleted")]
                 {
@@ -223,7 +229,10 @@ pub(super) fn inspected(inspected: &mut Option<PickedPoint>, context: &egui::Con
                 if let Some(words) = session.playing.alignment(point.layer) {
                     row("Begins", &words);
                 }
-                row("Index", &point.point.to_string());
+                match point.node {
+                    Some((key, index)) => row("Node and index", &format!("{key} {index}")),
+                    None => row("Index", &point.point.to_string()),
+                }
                 for (axis, value) in ["x", "y", "z"].into_iter().zip(&point.file_text) {
                     row(axis, value);
                 }

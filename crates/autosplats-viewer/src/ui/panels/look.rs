@@ -90,8 +90,7 @@ fn choose<T: PartialEq + Clone>(ui: &mut egui::Ui, label: &str, value: &mut T, o
 }
 
 fn color(ui: &mut egui::Ui, look: &mut Look, picture: Option<&Picture>) {
-    let fields: Vec<String> = picture
-        .map_or_else(Vec::new, |shot| shot.shown.cloud.fields().iter().map(|field| field.name.clone()).collect());
+    let fields: Vec<String> = picture.map_or_else(Vec::new, |shot| shot.shown.field_names());
     let shading = &mut look.settings.shading;
     let mut options = MODES.to_vec();
     for field in &fields {

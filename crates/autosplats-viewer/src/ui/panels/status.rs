@@ -3,7 +3,7 @@
 use eframe::egui;
 
 use crate::session::document::grouped;
-use crate::session::{CachedCounts, Session};
+use crate::session::{CachedCounts, Session, TreeStatus};
 use crate::view::View;
 
 /// The line, and the memory of the program, which is queried once a second.
@@ -19,7 +19,12 @@ impl Status {
         let shown = egui::Panel::bottom("status").show(ui, |ui| {
             ui.horizontal(|ui| {
                 let &CachedCounts { all: counts, bytes, old_bytes, .. } = session.counts();
-                ui.label(format!("{} points", grouped(counts.points)));
+                match session.trees.status() {
+                    Some(status) => octrees(ui, &status, counts.points),
+                    None => {
+                        ui.label(format!("{} points", grouped(counts.points)));
+                    }
+                }
                 if counts.selected > 0 {
                     ui.separator();
                     let color = ui.visuals().warn_fg_color;
@@ -66,5 +71,41 @@ impl Status {
             self.bytes = memory_stats::memory_stats().map(|stats| stats.physical_mem);
         }
         self.bytes
+    }
+}
+
+/// Shows how much is there of octrees, and the number of all points that are in memory if that is all.
+fn octrees(ui: &mut egui::Ui, status: &TreeStatus, points: usize) {
+    let TreeStatus { there, needed, stored, spacing_px, is_limited, .. } = *status;
+    let text =
+        if there < needed { format!("{} points", share(there, needed)) } else { format!("{} points", grouped(points)) };
+    let apart = format!("Neighbouring points are at most {spacing_px:.1} pixels apart where finer ones exist");
+    let hint = format!("Of {} points in octrees, what this view needs is read.\n{apart}.", grouped(stored as usize));
+    ui.label(text).on_hover_text(hint);
+    if is_limited {
+        let hint = format!("{apart}; a larger --points-budget or --memory shows finer ones");
+        ui.weak(format!("{spacing_px:.1} px")).on_hover_text(hint);
+    }
+}
+
+/// A number as a share of another, in millions if there are some.
+fn share(part: u64, all: u64) -> String {
+    if all < 1_000_000 {
+        return format!("{} of {}", grouped(part as usize), grouped(all as usize));
+    }
+    // A part is never shown as all.
+    let millions = |points: u64| (points as f64 * 1e-5).floor() * 0.1;
+    format!("{:.1} of {:.1}M", millions(part), (all as f64 * 1e-5).ceil() * 0.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::share;
+
+    #[test]
+    fn shares_are_short() {
+        assert_eq!(share(3_149_999, 7_400_000), "3.1 of 7.4M");
+        assert_eq!(share(7_399_999, 7_400_000), "7.3 of 7.4M", "not yet all");
+        assert_eq!(share(1500, 42_000), "1,500 of 42,000");
     }
 }

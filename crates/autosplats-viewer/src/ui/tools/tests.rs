@@ -137,7 +137,7 @@ fn a_double_click_measures_one_corner() {
     let shown = Arc::new(app.session.document().shown());
     for index in [0, 0, 1, 1, 0] {
         let seen = PickHit { index, shown: Arc::clone(&shown), surface: DVec3::ZERO };
-        app.ui.tools.picked(&app.session, Purpose::Measure, Some(seen));
+        app.ui.tools.picked(&mut app.session, Purpose::Measure, Some(seen));
     }
     let [one, other] = [DVec3::ZERO, DVec3::new(0.5, 0.0, 0.0)];
     assert_eq!(app.ui.tools.measured, [one, other, one], "none twice in a row");

@@ -25,7 +25,7 @@ use eframe::egui;
 
 pub(crate) use self::depths::Depths;
 pub(crate) use self::task::{Goal, Outcome, PickHit, Purpose, Task};
-use crate::session::{Document, ShownCloud};
+use crate::session::{Document, ShownCloud, TreeHandle};
 
 /// A request for a picture.
 #[derive(Clone)]
@@ -42,6 +42,8 @@ pub(crate) struct RenderRequest {
     pub(crate) axes: Option<Axes>,
     /// Time limit of the picture, milliseconds; `None` has no limit.
     pub(crate) budget_ms: Option<f64>,
+    /// Time limit of pictures while the view moves, milliseconds.
+    pub(crate) moving_ms: f64,
 }
 
 /// A rendered picture and its data.
@@ -60,6 +62,8 @@ pub(crate) struct Picture {
     pub(crate) remark: Option<String>,
     /// Milliseconds from the request to the finished picture.
     pub(crate) milliseconds: f64,
+    /// Number of points that a picture can have while the view moves, as far as known.
+    pub(crate) most_points: Option<usize>,
     /// Coarse depths. A GPU's pictures have them only at rest.
     pub(crate) depths: Depths,
     pub(crate) shown: Arc<ShownCloud>,
@@ -124,12 +128,12 @@ pub(crate) struct RenderThread {
 
 impl RenderThread {
     /// Starts the thread. `context` is asked for a repaint with each answer.
-    pub(crate) fn start(context: egui::Context) -> Self {
+    pub(crate) fn start(trees: TreeHandle, context: egui::Context) -> Self {
         let shared = Arc::new(Shared { post: Mutex::default(), news: Condvar::new() });
         let (sender, answers) = channel();
         let outbox = Outbox { sender, context };
         let theirs = Arc::clone(&shared);
-        crate::threads::spawn("render", move || thread::run(&theirs, &outbox));
+        crate::threads::spawn("render", move || thread::run(&theirs, &trees, &outbox));
         Self { shared, answers }
     }
 

@@ -1,7 +1,8 @@
 //! Chooses the size of a picture and the share of its points from its time limit.
 
 use autosplats::cloud::PointCloud;
-use rayon::prelude::*;
+
+use crate::session::ShownCloud;
 
 /// Smallest scale of a picture with a time limit, by its sides.
 const LEAST_SCALE: f64 = 0.25;
@@ -43,6 +44,13 @@ impl Costs {
         self.pixels = blend(self.pixels, pixel_ms / (pixels.max(1) as f64 * 1e-6));
     }
 
+    /// Number of points that a picture of `budget_ms` can have, rounded down to a power of two so that it seldom
+    /// changes; `None` while that is unknown.
+    pub(super) fn most_points(&self, budget_ms: f64) -> Option<usize> {
+        let millions = MAX_PROJECT_SHARE * budget_ms / self.points;
+        (self.points > 0.0 && millions.is_finite()).then(|| 1 << ((millions * 1e6).max(1.0) as usize).ilog2())
+    }
+
     /// The scale and share of points at which a picture of all `points` and `pixels` should take `budget_ms`.
     pub(super) fn pace(&mut self, points: usize, pixels: usize, budget_ms: f64) -> Reduction {
         let all_points = self.points * points as f64 * 1e-6;
@@ -69,7 +77,7 @@ impl Costs {
     }
 }
 
-/// A random subset of the points, for pictures with a time limit.
+/// A part of the points, for pictures with a time limit.
 pub(super) struct PointSubset {
     /// Identity of the full cloud.
     pub(super) identity: u64,
@@ -80,15 +88,10 @@ pub(super) struct PointSubset {
 }
 
 impl PointSubset {
-    /// Picks points by a hash of their index, so that the choice is always the same.
-    pub(super) fn new(cloud: &PointCloud, halvings: u32) -> Self {
-        let kept = |index: usize| {
-            let mixed = (index as u32).wrapping_mul(0x9E37_79B9).rotate_left(15).wrapping_mul(0x85EB_CA6B);
-            mixed >> (32 - halvings) == 0
-        };
-        let all = (0..cloud.len()).into_par_iter();
-        let indices: Vec<u32> = all.filter(|&index| kept(index)).map(|index| index as u32).collect();
-        Self { identity: cloud.identity(), halvings, cloud: cloud.pick(&indices), indices }
+    /// Picks the [part](ShownCloud::thinned) that a number of halvings leaves.
+    pub(super) fn new(shown: &ShownCloud, halvings: u32) -> Self {
+        let indices = shown.thinned(halvings);
+        Self { identity: shown.cloud.identity(), halvings, cloud: shown.cloud.pick(&indices), indices }
     }
 }
 
@@ -101,6 +104,16 @@ mod tests {
         let mut costs = Costs::default();
         costs.learn(100_000, 1_000_000, 2.0, 10.0);
         assert_eq!(costs.pace(100_000, 1_000_000, 33.0), Reduction::WHOLE, "12 of 33 ms");
+    }
+
+    #[test]
+    fn the_points_of_a_moving_picture_seldom_change_in_number() {
+        let mut costs = Costs::default();
+        assert_eq!(costs.most_points(33.0), None, "nothing is known");
+        for point_ms in [10.0, 11.0, 12.0] {
+            costs.learn(1_000_000, 1_000_000, point_ms, 90.0);
+            assert_eq!(costs.most_points(33.0), Some(1 << 20), "13 ms for points of about 11 ms a million");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
-use autosplats::cloud::glam::DVec2;
+use autosplats::cloud::glam::{DMat4, DVec2};
 use autosplats::cloud::{Axes, PointCloud, check_memory};
 use autosplats::{
     Backend, ColorMode, Error, Frame, GBuffer, Image, Reconstruction, Renderer, SearchEngine, Settings,
@@ -14,15 +14,15 @@ use rayon::prelude::*;
 use super::pace::{Costs, PointSubset, Reduction};
 use super::task::{Goal, Outcome, PickHit, enlarge};
 use super::{Answer, Depths, Outbox, Picture, RenderRequest, Shared, Task};
-use crate::session::{Document, LayerId, ShownCloud};
+use crate::session::{Document, LayerId, ShownCloud, Sight, TreeHandle};
 
 /// Colour that selected points are mixed with, sRGB.
 const SELECTION_COLOR: [u16; 3] = [255, 140, 20];
 /// Largest depth behind the surface at which a point still counts as seen, in splat radii.
 const SEEN_DEPTH_RADII: f32 = 2.0;
 
-pub(super) fn run(shared: &Shared, outbox: &Outbox) {
-    let mut studio = RenderState::default();
+pub(super) fn run(shared: &Shared, trees: &TreeHandle, outbox: &Outbox) {
+    let mut studio = RenderState::new(trees.clone());
     loop {
         let work = {
             let mut post = shared.lock();
@@ -51,7 +51,7 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
         });
         // A panic in one picture must not end all pictures, as the window may hold unsaved edits.
         let Ok(answer) = std::panic::catch_unwind(work) else {
-            studio = RenderState::default();
+            studio = RenderState::new(trees.clone());
             outbox.send(Answer::Failed("this picture failed, which is a bug in this program".into()));
             continue;
         };
@@ -85,8 +85,8 @@ struct Finer {
 }
 
 /// State kept from picture to picture.
-#[derive(Default)]
 struct RenderState {
+    trees: TreeHandle,
     /// The job for when nothing is requested.
     finer: Option<Finer>,
     renderer: Option<(Backend, Renderer)>,
@@ -112,15 +112,26 @@ impl Exposure {
             self.layers.clear();
             return usual_exposure(cloud);
         }
+        // Which nodes of octrees are there first is left to chance.
+        let samples: Vec<_> = document.trees().map(|(_, tree)| (&*tree.open.sample, DMat4::IDENTITY)).collect();
         let layers: Vec<_> = document.layers.iter().map(|layer| (layer.id, layer.tint)).collect();
         if self.layers != layers {
             (self.found, self.layers) = (None, layers);
         }
-        *self.found.get_or_insert_with(|| usual_exposure(cloud))
+        *self.found.get_or_insert_with(|| match &*samples {
+            [] => usual_exposure(cloud),
+            [(sample, _)] => usual_exposure(sample),
+            several => usual_exposure(&PointCloud::merged(several)),
+        })
     }
 }
 
 impl RenderState {
+    fn new(trees: TreeHandle) -> Self {
+        let (costs, exposure) = (Costs::default(), Exposure::default());
+        Self { trees, finer: None, renderer: None, costs, shown: None, sparse: None, exposure }
+    }
+
     /// The points that a wish shows; cached until they change.
     fn shown(&mut self, wish: &RenderRequest) -> Result<Arc<ShownCloud>, Error> {
         if let Some((axes, shown)) = &self.shown
@@ -194,7 +205,7 @@ impl RenderState {
         let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
         let fits = |sparse: &PointSubset| (sparse.identity, sparse.halvings) == (shown.cloud.identity(), pace.halvings);
         if pace.halvings > 0 && !self.sparse.as_ref().is_some_and(fits) {
-            self.sparse = Some(PointSubset::new(&shown.cloud, pace.halvings));
+            self.sparse = Some(PointSubset::new(&shown, pace.halvings));
         }
         let exposure = self.exposure.of(&wish.document, &shown.cloud);
         let Self { renderer: Some((_, renderer)), sparse, costs, finer, .. } = self else { return Ok(Answer::Empty) };
@@ -234,6 +245,7 @@ impl RenderState {
             timings,
             remark,
             milliseconds: started.elapsed().as_secs_f64() * 1e3,
+            most_points: costs.most_points(wish.budget_ms.unwrap_or(wish.moving_ms)),
             depths,
             shown,
         })))
@@ -323,7 +335,9 @@ impl RenderState {
                 let hits = (0..shown.cloud.len()).into_par_iter().map(hit).collect();
                 Ok(Outcome::Selected { shown, hits, mode })
             }
-            Task::Photograph { wish, goal } => {
+            Task::Photograph { mut wish, goal } => {
+                let sight = Sight::new(wish.camera, wish.size, &wish.settings.shading.color);
+                wish.document = self.trees.completed(&wish.document, sight).map_err(Error::NothingVisible)?;
                 let shown = self.shown(&wish)?;
                 let mut settings = self.settings(&wish, &shown, outbox)?;
                 // Pictures of a film follow each other, so that they are steadied.
@@ -440,7 +454,8 @@ mod tests {
         settings.reconstruction.engine = engine;
         let document = Document::default();
         let backend = Backend::Cpu;
-        RenderRequest { document, camera, size: [8, 8], settings, dots: None, backend, axes: None, budget_ms: None }
+        let (dots, axes, budget_ms, moving_ms) = (None, None, None, 33.0);
+        RenderRequest { document, camera, size: [8, 8], settings, dots, backend, axes, budget_ms, moving_ms }
     }
 
     #[test]
