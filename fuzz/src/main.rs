@@ -58,6 +58,9 @@ const POOL: usize = 512;
 /// Number of findings after which a format ends.
 const ENOUGH: usize = 10;
 
+/// Points that are kept of some inputs.
+const KEPT: [&str; 3] = ["usual", "ground,2..5,first", "-noise,-withheld,last"];
+
 /// Feeds changed files to every reader.
 #[derive(Debug, Parser)]
 struct Arguments {
@@ -274,6 +277,7 @@ impl<'a> Run<'a> {
             exact: random.modulo(4) == 0,
             keep_no_returns: random.modulo(8) == 0,
             columns: (random.modulo(16) == 0).then(|| ["x", "y", "z", "-"].map(String::from).into()),
+            keep: KEPT.get(random.modulo(4 * KEPT.len())).map(|words| words.parse()).transpose()?,
             ..ReadOptions::default()
         };
         let mesh = random.modulo(4) == 0;

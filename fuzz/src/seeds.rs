@@ -1,12 +1,13 @@
 //! Small complete files of every format, with a variant for each path through its reader.
 
-use std::path::Path;
+use std::{io::Write as _, path::Path};
 
 use anyhow::{Context as _, Result};
 use autosplats_cloud::glam::{DMat4, DQuat, DVec3};
 use autosplats_cloud::{FieldValues, PointCloud, Scan};
 use autosplats_formats::write;
 use autosplats_sources::point_cloud2::Encoding;
+use flate2::{Compression, write::GzEncoder};
 
 use crate::{
     recording::{Message, POINTS as CLOUDS, Style, TRANSFORMS, Topic, bag, mcap},
@@ -53,6 +54,8 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         seeds("xyz", [written("xyz")?, vec![rows.clone().into_bytes()]].concat()),
         seeds("pts", [written("pts")?, vec![format!("{POINTS}\n{rows}").into_bytes()]].concat()),
         seeds("csv", [written("csv")?, vec![odd_csv(), grouped_csv()]].concat()),
+        seeds("xyz.gz", vec![gzip(rows.as_bytes())?, [gzip(rows.as_bytes())?, gzip(positions.as_bytes())?].concat()]),
+        seeds("las.gz", las(false)?.iter().map(|file| gzip(file)).collect::<Result<_>>()?),
         seeds("grd", vec![grid()]),
         seeds("obj", vec![format!("# a\ng b\n{vertices}{}", faces("f", 1)).into_bytes(), odd_obj()]),
         seeds("off", vec![format!("OFF\n{POINTS} {} 0\n{positions}{}", POINTS - 2, faces("3", 0)).into_bytes()]),
@@ -124,6 +127,12 @@ fn written(extension: &str) -> Result<Vec<Vec<u8>>> {
 fn file(cloud: &PointCloud, path: &Path) -> Result<Vec<u8>> {
     write(cloud, path, &()).with_context(|| format!("seed {}", path.display()))?;
     Ok(std::fs::read(path)?)
+}
+
+fn gzip(bytes: &[u8]) -> Result<Vec<u8>> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(bytes)?;
+    Ok(encoder.finish()?)
 }
 
 fn ascii_ply() -> Vec<u8> {

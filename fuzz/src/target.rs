@@ -95,7 +95,7 @@ pub(crate) fn read(
     progress: &dyn Progress,
 ) -> Result<usize, Error> {
     if let Some(tree) = tree(name, bytes)? {
-        let wanted = Wanted { colors: !mesh, exact: options.exact, ..Wanted::default() };
+        let wanted = Wanted { colors: !mesh, exact: options.exact, keep: options.keep.clone(), ..Wanted::default() };
         return read_part(&*tree, &Part::default(), &wanted, progress).map(|cloud| cloud.len());
     }
     if let Some(encoding) = message(name) {
