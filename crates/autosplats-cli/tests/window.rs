@@ -12,6 +12,7 @@ mod screen;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use autosplats_serve::Server;
 use screen::{Picture, Screen, keys};
 
 /// Largest difference of equal pictures, of 1: half a level.
@@ -127,6 +128,43 @@ fn a_session_in_a_window() {
         "render makes the same picture: {}",
         seen.difference(&rendered)
     );
+}
+
+#[test]
+fn an_octree_in_a_window_is_what_a_render_shows() {
+    let Some(scans) = common::data().map(|data| data.join("scans")) else { return };
+    let folder = common::Folder::new();
+    let Some(mut screen) = Screen::start([1280, 800]) else { return };
+    let server = Server::start(&scans, Duration::from_millis(100)).expect("a server");
+    let address = server.address("lone_star.copc.laz");
+    let mut command = folder.command(&["view", &address, "--backend", "cpu", "--points-budget", "300K"]);
+    command.args(["--header", "X-Test: 1"]);
+    screen.run(command, &folder.path("home"));
+    let view = [330, 120, 1180, 700];
+    screen.settled("tree-1-opened", |picture| picture.crop(view).spread() > 20.0);
+    screen.keys_with(keys::CTRL, keys::C);
+    folder.write("view.json", &screen.clipboard().expect("a view is on the clipboard"));
+    screen.key(keys::X);
+    screen.click([755, 410]);
+    screen.settled("tree-2-inspected", |_| true);
+    screen.key(keys::ESCAPE);
+    screen.key(keys::ESCAPE);
+    screen.keys_with(keys::CTRL, keys::S);
+    screen.settled("tree-3-dialog", |_| true);
+    screen.key(keys::ENTER);
+    let saved = folder.path("picture.png");
+    screen.wait("tree-4-saved", Duration::from_secs(120), |_| saved.is_file()).expect("the picture is written");
+    screen.keys_with(keys::CTRL, keys::Q);
+    assert_eq!(screen.finish(), Some(0), "the window closes as it should: {}", screen.words());
+    let near = scans.join("lone_star.copc.laz").display().to_string();
+    let camera = ["--camera", "view.json", "--size", "1920x1080", "--backend", "cpu"];
+    let limits = ["--detail", "1", "--points-budget", "300K", "-o", "rendered.png"];
+    folder.succeed(&[&["render", &*near][..], &camera, &limits].concat());
+    let [seen, rendered] = ["picture.png", "rendered.png"].map(|name| Picture::read(&folder.path(name)));
+    let off = seen.difference(&rendered);
+    assert!(off < MAX_DIFFERENCE, "render makes the same picture: {off}");
+    let refused = ["view", &near, "--memory", "100M"];
+    folder.fail(&refused, 2, &["--memory", "at least"]);
 }
 
 /// An empty screen has one colour.

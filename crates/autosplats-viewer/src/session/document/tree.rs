@@ -54,7 +54,10 @@ impl OpenTree {
         if let Some(name) = info.fields.iter().find(lacking) {
             cloud = cloud.with_field(name, FieldValues::U8(vec![0; len])).expect(fits);
         }
-        (LayerTree { open: Arc::clone(self), nodes: list }, Arc::new(cloud.with_axes(self.axes)))
+        (
+            LayerTree { open: Arc::clone(self), nodes: list, field: field.map(str::to_owned) },
+            Arc::new(cloud.with_axes(self.axes)),
+        )
     }
 
     /// The cloud of the coarsest nodes.
@@ -80,6 +83,8 @@ pub(crate) struct LayerTree {
     pub(crate) open: Arc<OpenTree>,
     /// In the order of their points.
     pub(crate) nodes: Arc<[LoadedNode]>,
+    /// The field that the nodes have in addition to colours.
+    pub(crate) field: Option<String>,
 }
 
 impl LayerTree {

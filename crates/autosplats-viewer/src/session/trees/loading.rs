@@ -1,6 +1,6 @@
 //! Loading the nodes of a picture.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ use super::mailbox::{Follower, Shared};
 use super::store::{Store, id_of};
 use super::{ShownNodes, TreeOptions, TreeStatus, Wish, WishedTree};
 use crate::session::LayerId;
-use crate::session::document::OpenTree;
+use crate::session::document::{LayerTree, OpenTree};
 
 /// Time that news waits before it is shown while more is to come.
 const NEWS_WAIT: Duration = Duration::from_millis(250);
@@ -32,12 +32,22 @@ pub(super) struct Loading<'a> {
     /// What each layer shows.
     shown: HashMap<LayerId, Shown>,
     shown_at: Option<Instant>,
+    /// Whether something waits to be shown.
+    is_waiting: bool,
+    /// Number of points that the picture in work needs and that are there.
+    there: u64,
     failures: HashMap<usize, Failure>,
 }
 
-/// What a layer shows: an octree, the field that its colours can show, and nodes.
+/// What a layer shows: an octree, the field that the nodes have, and the nodes.
 #[derive(Debug, PartialEq)]
 struct Shown(usize, Option<String>, Vec<Key>);
+
+impl Shown {
+    fn of(LayerTree { open, nodes, field }: &LayerTree) -> Self {
+        Self(id_of(open), field.clone(), nodes.iter().map(|node| node.key).collect())
+    }
+}
 
 /// Why an octree could not be read.
 struct Failure {
@@ -56,7 +66,7 @@ pub(super) struct TreePicture<'w> {
 
 impl TreePicture<'_> {
     fn open(&self, node: NodeKey) -> &Arc<OpenTree> {
-        &self.trees[node.tree as usize].open
+        self.trees[node.tree as usize].open()
     }
 
     /// Number of points of a node, as stated.
@@ -85,13 +95,23 @@ impl TreePicture<'_> {
 impl<'a> Loading<'a> {
     pub(super) fn new(shared: &'a Shared, options: &TreeOptions) -> Self {
         let memory = options.memory.unwrap_or_else(usual_memory);
-        let (shown, failures) = (HashMap::new(), HashMap::new());
-        Self { shared, options: *options, memory, store: Store::default(), shown, shown_at: None, failures }
+        Self {
+            shared,
+            options: *options,
+            memory,
+            store: Store::default(),
+            shown: HashMap::new(),
+            shown_at: None,
+            is_waiting: false,
+            there: 0,
+            failures: HashMap::new(),
+        }
     }
 
-    /// When to try again what could not be read.
-    pub(super) fn retry_at(&self) -> Option<Instant> {
-        self.failures.values().map(|failure| failure.again).min()
+    /// When to go on with the same wish: to show what waits, or to try again what could not be read.
+    pub(super) fn due_at(&self) -> Option<Instant> {
+        let shows = self.shown_at.filter(|_| self.is_waiting).map(|shown_at| shown_at + NEWS_WAIT);
+        self.failures.values().map(|failure| failure.again).chain(shows).min()
     }
 
     /// Tries at once what could not be read.
@@ -100,8 +120,8 @@ impl<'a> Loading<'a> {
     }
 
     /// Why an octree could not be read.
-    pub(super) fn failure(&self, open: &Arc<OpenTree>) -> Option<&str> {
-        self.failures.get(&id_of(open)).map(|failure| &*failure.why)
+    pub(super) fn failure(&self, tree: &WishedTree) -> Option<&str> {
+        self.failures.get(&id_of(tree.open())).map(|failure| &*failure.why)
     }
 
     fn waits(&self, open: &Arc<OpenTree>) -> bool {
@@ -110,19 +130,21 @@ impl<'a> Loading<'a> {
 
     /// The picture of a wish; `None` if it shows no octree.
     pub(super) fn picture<'w>(&mut self, wish: &'w Wish) -> Option<TreePicture<'w>> {
-        let ids: Vec<usize> = wish.trees.iter().map(|tree| id_of(&tree.open)).collect();
-        self.failures.retain(|id, _| ids.contains(id));
+        self.is_waiting = false;
+        let ids: Vec<usize> = wish.trees.iter().map(|tree| id_of(tree.open())).collect();
+        let is_seen = wish.trees.iter().any(|tree| tree.visible);
+        self.failures.retain(|id, _| is_seen && ids.contains(id));
         self.shown.retain(|layer, _| wish.trees.iter().any(|tree| tree.layer == *layer));
-        self.store.prepare(wish.trees.iter().map(|tree| &tree.open), wish.sight.field.as_deref());
+        self.store.prepare(wish.trees.iter().map(WishedTree::open), wish.sight.field.as_deref());
         let trees: Vec<_> = wish.trees.iter().filter(|tree| tree.visible).collect();
-        let point_bytes = trees.iter().map(|tree| tree.open.tree.point_bytes(&self.wanted(&tree.open))).max()?;
+        let point_bytes = trees.iter().map(|tree| tree.open().tree.point_bytes(&self.wanted(tree.open()))).max()?;
         let limits = Limits::new(self.memory, wish.sight.size, self.options.max_points, point_bytes, wish.is_copied);
         let max_points = limits.max_points.min(wish.sight.moving.unwrap_or(usize::MAX));
         let spacing_px = self.options.detail.unwrap_or(Detail::default().spacing_px);
         let detail = Detail::of_points(spacing_px, max_points);
-        let place = |tree: &&WishedTree| {
-            let WishedTree { open, world_from_tree, .. } = *tree;
-            PlacedTree { tree: Arc::clone(&open.tree), world_from_tree: *world_from_tree }
+        let place = |tree: &&WishedTree| PlacedTree {
+            tree: Arc::clone(&tree.open().tree),
+            world_from_tree: tree.world_from_tree,
         };
         Some(TreePicture { wish, placed: trees.iter().map(place).collect(), trees, detail, limits })
     }
@@ -149,6 +171,10 @@ impl<'a> Loading<'a> {
             self.store.choose();
             let missing = choice.by_need.iter().copied().filter(|node| !self.store.need(picture.open(*node), node.key));
             let mut missing: Vec<NodeKey> = missing.collect();
+            self.there = choice.points - missing.iter().map(|node| picture.points(*node)).sum::<u64>();
+            let lacking = missing.iter().chain(&choice.unknown).map(|node| id_of(picture.open(*node)));
+            let lacking: HashSet<usize> = lacking.collect();
+            self.failures.retain(|id, _| lacking.contains(id));
             missing.retain(|node| !self.waits(picture.open(*node)));
             if shows {
                 self.report(picture, &choice);
@@ -161,7 +187,7 @@ impl<'a> Loading<'a> {
                     let own = unknown.iter().filter(|node| node.tree as usize == index);
                     let keys: Vec<Key> = own.map(|node| node.key).collect();
                     let loaded = placed.tree.load_pages(&keys, follower).map_err(Error::from);
-                    self.follow(&picture.trees[index].open, loaded)?;
+                    self.follow(picture.trees[index].open(), loaded)?;
                 }
                 follower.come();
                 continue;
@@ -185,17 +211,18 @@ impl<'a> Loading<'a> {
         follower: &Follower<'_>,
         shows: bool,
     ) -> Result<(), Error> {
-        let open = &picture.trees[index].open;
+        let open = picture.trees[index].open();
         let own = [PlacedTree { tree: Arc::clone(&open.tree), world_from_tree: DMat4::IDENTITY }];
         let wanted = self.wanted(open);
         let mut damaged = [0, 0];
         let mut first_damage = None;
         let loaded = load_nodes(&own, nodes, &wanted, follower, |NodePoints { node, cloud, damage }| {
+            let points = picture.points(NodeKey { tree: index as u32, ..node });
             if let Some(damage) = damage {
-                let node = NodeKey { tree: index as u32, ..node };
-                damaged = [damaged[0] + 1, damaged[1] + picture.points(node)];
+                damaged = [damaged[0] + 1, damaged[1] + points];
                 first_damage.get_or_insert(damage);
             }
+            self.there += points;
             self.store.insert(open, node.key, Arc::new(cloud));
             self.store.trim(picture.limits.stored_bytes);
             follower.come();
@@ -234,28 +261,38 @@ impl<'a> Loading<'a> {
 
     /// Tells how much is there.
     fn report(&self, picture: &TreePicture<'_>, choice: &Choice) {
-        let there = choice.by_need.iter().filter(|node| self.store.get(picture.open(**node), node.key).is_some());
-        let there = there.map(|node| picture.points(*node)).sum();
+        let there = self.there;
         let at_rest = picture.wish.sight.moving.is_none();
         self.shared.set_status(TreeStatus {
             there,
             needed: choice.points,
-            stored: picture.trees.iter().map(|tree| tree.open.tree.info().points).sum(),
+            stored: picture.trees.iter().map(|tree| tree.open().tree.info().points).sum(),
             spacing_px: choice.spacing_px,
             is_limited: at_rest && choice.spacing_px > picture.detail.spacing_px,
             complete: at_rest && there == choice.points && choice.unknown.is_empty(),
         });
     }
 
+    /// Shows all that is there. A view that moves is followed by others, so that what it needs waits as news does.
+    pub(super) fn finish(&mut self, picture: &TreePicture<'_>, choice: &Choice) {
+        if picture.wish.sight.moving.is_some() {
+            self.show_in_time(picture, choice);
+        } else {
+            self.show(picture, choice);
+        }
+    }
+
     fn show_in_time(&mut self, picture: &TreePicture<'_>, choice: &Choice) {
         if self.shown_at.is_none_or(|shown_at| shown_at.elapsed() >= NEWS_WAIT) {
             self.show(picture, choice);
+        } else {
+            self.is_waiting = true;
         }
     }
 
     /// The nodes of an octree that are there, in the order of their keys, with their ranks.
     fn nodes(&self, picture: &TreePicture<'_>, index: usize, choice: &Choice) -> Vec<(Key, usize)> {
-        let open = &picture.trees[index].open;
+        let open = picture.trees[index].open();
         let own = choice.by_need.iter().enumerate().filter(|(_, node)| node.tree as usize == index);
         let mut nodes: Vec<_> = own.map(|(rank, node)| (node.key, rank)).collect();
         nodes.retain(|(key, _)| self.store.get(open, *key).is_some());
@@ -264,8 +301,9 @@ impl<'a> Loading<'a> {
     }
 
     fn cloud(&self, tree: &WishedTree, nodes: &[(Key, usize)]) -> ShownNodes {
-        let there = nodes.iter().filter_map(|(key, rank)| Some((*key, *rank, &**self.store.get(&tree.open, *key)?)));
-        let (nodes, cloud) = tree.open.cloud(there, self.store.field());
+        let open = tree.open();
+        let there = nodes.iter().filter_map(|(key, rank)| Some((*key, *rank, &**self.store.get(open, *key)?)));
+        let (nodes, cloud) = open.cloud(there, self.store.field());
         (tree.layer, nodes, cloud)
     }
 
@@ -277,21 +315,18 @@ impl<'a> Loading<'a> {
 
     /// Shows what is there, where it differs from what is shown. A layer out of view keeps its nodes.
     pub(super) fn show(&mut self, picture: &TreePicture<'_>, choice: &Choice) {
+        self.is_waiting = false;
         let mut new = Vec::new();
         for (index, tree) in picture.trees.iter().enumerate() {
             let nodes = self.nodes(picture, index, choice);
             let keys = nodes.iter().map(|(key, _)| *key).collect();
-            let shown = Shown(id_of(&tree.open), self.store.field().map(str::to_owned), keys);
-            let first = || {
-                let mut keys: Vec<Key> = tree.open.first.iter().map(|(key, _)| *key).collect();
-                keys.sort_unstable();
-                Shown(id_of(&tree.open), None, keys)
-            };
-            if nodes.is_empty() || *self.shown.entry(tree.layer).or_insert_with(first) == shown {
+            let shown = Shown(id_of(tree.open()), self.store.field().map(str::to_owned), keys);
+            let before = self.shown.entry(tree.layer).or_insert_with(|| Shown::of(&tree.tree));
+            if nodes.is_empty() || *before == shown {
                 continue;
             }
+            *before = shown;
             let cloud = self.cloud(tree, &nodes);
-            self.shown.insert(tree.layer, shown);
             if !cloud.2.is_empty() {
                 new.push(cloud);
             }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use autosplats::cloud::Progress;
 use eframe::egui;
@@ -13,6 +13,12 @@ use super::{ShownNodes, TreeStatus, Wish};
 
 /// Largest number of notes that may wait for the window.
 const MOST_NOTES: usize = 20;
+
+/// Time that a status waits, so that numbers that grow do not keep the window busy.
+const STATUS_WAIT: Duration = Duration::from_millis(100);
+
+/// Time that a wish has for its first node while newer ones wait.
+const PATIENCE: Duration = Duration::from_secs(3);
 
 /// A picture that needs all of its nodes.
 pub(super) struct Order {
@@ -122,7 +128,7 @@ impl Shared {
             let before = post.status.replace(status);
             drop(post);
             if before != Some(status) {
-                self.context.request_repaint();
+                self.context.request_repaint_after(STATUS_WAIT);
             }
         }
     }
@@ -161,9 +167,10 @@ impl Shared {
 }
 
 /// Follows the reading for a wish, and cancels it for a newer one: not before a node has come, so that all wishes
-/// together get on.
+/// together get on, unless nobody answers.
 pub(super) struct Follower<'a> {
     shared: &'a Shared,
+    started: Instant,
     /// Number of the wish; `None` for an order, which only a closed window cancels.
     number: Option<u64>,
     has_come: AtomicBool,
@@ -171,7 +178,7 @@ pub(super) struct Follower<'a> {
 
 impl<'a> Follower<'a> {
     pub(super) fn new(shared: &'a Shared, number: Option<u64>) -> Self {
-        Self { shared, number, has_come: AtomicBool::new(false) }
+        Self { shared, started: Instant::now(), number, has_come: AtomicBool::new(false) }
     }
 
     /// Notes that something has come.
@@ -186,7 +193,8 @@ impl Progress for Follower<'_> {
     fn cancelled(&self) -> bool {
         let post = self.shared.lock();
         let is_old = self.number.is_some_and(|number| number != post.number) || !post.orders.is_empty();
-        post.closed || is_old && self.number.is_some() && self.has_come.load(Ordering::Relaxed)
+        let has_had_time = self.has_come.load(Ordering::Relaxed) || self.started.elapsed() > PATIENCE;
+        post.closed || is_old && self.number.is_some() && has_had_time
     }
 
     fn note(&self, note: &str) {

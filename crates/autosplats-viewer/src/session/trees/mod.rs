@@ -67,15 +67,23 @@ impl Sight {
 #[derive(Clone, Debug)]
 struct WishedTree {
     layer: LayerId,
-    open: Arc<OpenTree>,
+    /// The octree, and what the layer showed of it at the time.
+    tree: LayerTree,
     world_from_tree: DMat4,
     visible: bool,
 }
 
+impl WishedTree {
+    fn open(&self) -> &Arc<OpenTree> {
+        &self.tree.open
+    }
+}
+
 impl PartialEq for WishedTree {
     fn eq(&self, other: &Self) -> bool {
-        let Self { layer, open, world_from_tree, visible } = self;
-        let same = *layer == other.layer && Arc::ptr_eq(open, &other.open);
+        // Other nodes of the same octree are no other wish.
+        let Self { layer, tree, world_from_tree, visible } = self;
+        let same = *layer == other.layer && Arc::ptr_eq(&tree.open, other.open());
         same && *world_from_tree == other.world_from_tree && *visible == other.visible
     }
 }
@@ -92,9 +100,8 @@ struct Wish {
 impl Wish {
     fn new(document: &Document, sight: Sight) -> Self {
         let of_tree = |layer: &crate::session::Layer| {
-            let (layer, tree) = (layer, layer.tree.as_ref()?);
-            let (open, world_from_tree) = (Arc::clone(&tree.open), layer.pose);
-            Some(WishedTree { layer: layer.id, open, world_from_tree, visible: layer.visible })
+            let tree = layer.tree.clone()?;
+            Some(WishedTree { layer: layer.id, tree, world_from_tree: layer.pose, visible: layer.visible })
         };
         let plain = match document.layers.iter().filter(|layer| layer.visible).collect::<Vec<_>>()[..] {
             [only] => only.pose == DMat4::IDENTITY && only.tint.is_none(),
@@ -195,6 +202,12 @@ impl Session {
             Ok(note) => self.messages.note(note),
             Err(error) => self.messages.error(error),
         });
+        let replaced = nodes.iter().filter_map(|(layer, ..)| Some(Arc::clone(&self.document().layer(*layer)?.cloud)));
+        let replaced: Vec<_> = replaced.collect();
+        if !replaced.is_empty() {
+            // To free so many points takes longer than a window frame may.
+            crate::threads::spawn("free", move || drop(replaced));
+        }
         for (layer, tree, cloud) in nodes {
             let is_looked_at = self.glance.as_ref().is_some_and(|(version, _)| *version == self.version);
             self.settle(|document| document.show_nodes(layer, &tree, &cloud));

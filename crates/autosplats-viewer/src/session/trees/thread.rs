@@ -11,7 +11,7 @@ use super::{TreeOptions, Wish};
 pub(super) fn run(shared: &Shared, options: &TreeOptions) {
     let mut loading = Loading::new(shared, options);
     let mut seen = 0;
-    while let Some(work) = shared.next(&mut seen, loading.retry_at()) {
+    while let Some(work) = shared.next(&mut seen, loading.due_at()) {
         let worked = catch_unwind(AssertUnwindSafe(|| match work {
             Work::Wish(wish) => fulfil(&mut loading, shared, &wish, seen),
             Work::Order(order) => {
@@ -37,7 +37,7 @@ fn fulfil(loading: &mut Loading<'_>, shared: &Shared, wish: &Wish, number: u64) 
     let Some(picture) = loading.picture(wish) else { return true };
     match loading.load(&picture, &Follower::new(shared, Some(number)), true) {
         Ok(choice) => {
-            loading.show(&picture, &choice);
+            loading.finish(&picture, &choice);
             true
         }
         Err(Error::Cancelled) => false,
@@ -53,7 +53,7 @@ fn deliver(loading: &mut Loading<'_>, shared: &Shared, Order { wish, reply }: Or
         Some(picture) => {
             loading.retry_now();
             let loaded = loading.load(&picture, &Follower::new(shared, None), false);
-            let failure = picture.trees.iter().find_map(|tree| loading.failure(&tree.open));
+            let failure = picture.trees.iter().find_map(|tree| loading.failure(tree));
             match (loaded, failure) {
                 (Err(error), _) => Err(error.to_string()),
                 (Ok(_), Some(why)) => Err(why.to_owned()),
