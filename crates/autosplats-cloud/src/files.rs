@@ -105,3 +105,68 @@ pub fn temporary_beside(path: &Path, suffix: impl AsRef<OsStr>) -> std::io::Resu
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder)
 }
+
+/// A temporary file without a name, which the system removes once it is closed, however the program ends.
+///
+/// # Errors
+/// Those of the operating system.
+pub fn temporary_unnamed(folder: &Path) -> std::io::Result<File> {
+    tempfile::tempfile_in(folder)
+}
+
+/// Bytes that can be written to the disk of a folder, if the system states them (not on Windows).
+pub fn free_disk(folder: &Path) -> Option<u64> {
+    #[cfg(unix)]
+    return rustix::fs::statvfs(folder).ok().and_then(|disk| disk.f_bavail.checked_mul(disk.f_frsize));
+    #[cfg(not(unix))]
+    {
+        let _ = folder;
+        None
+    }
+}
+
+/// Reads the bytes of a file from byte `at` on, whatever other threads read.
+///
+/// # Errors
+/// Those of the operating system.
+pub fn read_exact_at(file: &File, bytes: &mut [u8], at: u64) -> std::io::Result<()> {
+    #[cfg(unix)]
+    return std::os::unix::fs::FileExt::read_exact_at(file, bytes, at);
+    #[cfg(windows)]
+    {
+        use std::io::ErrorKind::{Interrupted, UnexpectedEof};
+        let (mut bytes, mut at) = (bytes, at);
+        while !bytes.is_empty() {
+            match std::os::windows::fs::FileExt::seek_read(file, bytes, at) {
+                Ok(0) => return Err(UnexpectedEof.into()),
+                Ok(read) => (bytes, at) = (&mut bytes[read..], at + read as u64),
+                Err(error) if error.kind() == Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes bytes to a file from byte `at` on, whatever other threads write.
+///
+/// # Errors
+/// Those of the operating system.
+pub fn write_all_at(file: &File, bytes: &[u8], at: u64) -> std::io::Result<()> {
+    #[cfg(unix)]
+    return std::os::unix::fs::FileExt::write_all_at(file, bytes, at);
+    #[cfg(windows)]
+    {
+        use std::io::ErrorKind::{Interrupted, WriteZero};
+        let (mut bytes, mut at) = (bytes, at);
+        while !bytes.is_empty() {
+            match std::os::windows::fs::FileExt::seek_write(file, bytes, at) {
+                Ok(0) => return Err(WriteZero.into()),
+                Ok(written) => (bytes, at) = (&bytes[written..], at + written as u64),
+                Err(error) if error.kind() == Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}

@@ -3,6 +3,9 @@
 /// Bytes of a point record, by point format.
 pub(crate) const RECORD_LEN: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
+/// Byte offset of the GPS time in point formats 6 and up.
+pub(crate) const WIDE_TIME: usize = 22;
+
 /// Bytes before the data of a variable length record (VLR).
 pub(crate) const VLR_HEADER: usize = 54;
 /// Bytes before the data of an extended variable length record (EVLR).
@@ -13,6 +16,14 @@ pub(crate) const EXTRA_DESCRIPTOR: usize = 192;
 
 /// Degrees of one step of the scan angle in point formats 6 and above.
 pub(crate) const ANGLE_STEP: f32 = 0.006;
+
+/// Bytes of an extra value of this type, of which some are pairs and triples. `None` if there is no such type, or it
+/// has no size of its own.
+pub(crate) fn extra_size(kind: u8) -> Option<usize> {
+    const SIZES: [usize; 10] = [1, 1, 2, 2, 4, 4, 8, 8, 4, 8];
+    let index = usize::from(kind.checked_sub(1)?);
+    (index < 30).then(|| SIZES[index % 10] * (index / 10 + 1))
+}
 
 /// User ids and record ids of the variable length records that are read or written.
 pub(crate) const SPEC: &str = "LASF_Spec";
@@ -59,11 +70,11 @@ pub(crate) fn is_wide(format: usize) -> bool {
 }
 
 /// Byte offset of the GPS time.
-fn time(format: usize) -> Option<usize> {
+pub(crate) fn time(format: usize) -> Option<usize> {
     match format {
         0 | 2 => None,
         1..=5 => Some(20),
-        _ => Some(22),
+        _ => Some(WIDE_TIME),
     }
 }
 

@@ -15,5 +15,5 @@ mod scene;
 mod surface;
 
 pub use scanner::{Scanner, Scanners};
-pub use scene::{Hit, SCENE_PREFIX, Scene, View, parse_count};
+pub use scene::{Hit, SCENE_PREFIX, Sampler, Scene, View, parse_count};
 pub use surface::Surface;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::{Counter, Ranges, Traffic, check_range};
-use crate::{Error, Progress, check_memory};
+use crate::{Error, Progress, check_memory, read_exact_at};
 
 /// Ranges of a local file.
 #[derive(Debug)]
@@ -60,25 +60,6 @@ impl Ranges for FileRanges {
     fn traffic(&self) -> Traffic {
         self.read.traffic()
     }
-}
-
-#[cfg(unix)]
-fn read_exact_at(file: &File, bytes: &mut [u8], at: u64) -> std::io::Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, bytes, at)
-}
-
-#[cfg(windows)]
-fn read_exact_at(file: &File, mut bytes: &mut [u8], mut at: u64) -> std::io::Result<()> {
-    use std::io::ErrorKind::{Interrupted, UnexpectedEof};
-    while !bytes.is_empty() {
-        match std::os::windows::fs::FileExt::seek_read(file, bytes, at) {
-            Ok(0) => return Err(UnexpectedEof.into()),
-            Ok(read) => (bytes, at) = (&mut bytes[read..], at + read as u64),
-            Err(error) if error.kind() == Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 //! [`Progress::note`], once per kind of loss.
 
 mod colors;
+mod copc;
 mod decimal;
 mod e57;
 mod job;
@@ -18,5 +19,6 @@ mod records;
 mod registry;
 mod xyz;
 
+pub use self::copc::{Clouds, TreeInput, TreeOptions, TreeSummary, write_tree};
 use self::job::{Format, Job, note_left_out};
 pub use self::registry::{check_writable, write, written_formats};

@@ -5,13 +5,13 @@ use std::path::Path;
 use autosplats_cloud::{Error, PointCloud, Progress, write_whole};
 
 use super::{
-    e57,
+    copc, e57,
     job::{Format, Job},
     las, pcd, ply, xyz,
 };
 
 /// All formats; longer extensions precede shorter ones.
-const FORMATS: &[Format] = &[ply::FORMAT, las::LAS, las::LAZ, pcd::FORMAT, e57::FORMAT, xyz::FORMAT];
+const FORMATS: &[Format] = &[copc::FORMAT, ply::FORMAT, las::LAS, las::LAZ, pcd::FORMAT, e57::FORMAT, xyz::FORMAT];
 
 /// Names and extensions of the formats that [`write()`] can write.
 pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
@@ -55,11 +55,6 @@ pub fn write(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result
 
 fn format(path: &Path) -> Result<&'static Format, Error> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    if name.ends_with(".copc.laz") {
-        // Programs that read parts of a file expect an octree in files of this name.
-        let what = "COPC is not written; leave the '.copc' out of the name for plain LAZ";
-        return Err(Error::Unsupported { path: path.into(), what: what.into() });
-    }
     let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
     let format = FORMATS.iter().find(|format| format.extensions.iter().any(ends));
     format.ok_or_else(|| Error::UnknownOutput { path: path.into(), known: format_names() })

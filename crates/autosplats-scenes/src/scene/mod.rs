@@ -26,6 +26,7 @@ mod statue;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use autosplats_cloud::{Axes, Error, PointCloud, Progress};
@@ -69,7 +70,55 @@ pub struct Hit {
     pub rgb: [f32; 3],
 }
 
+/// Makes the points of a [`Scene`], in parts.
+pub struct Sampler<'a> {
+    scene: &'a Scene,
+    count: usize,
+    way: Way<'a>,
+}
+
+/// How points are taken from a surface.
+enum Way<'a> {
+    Sampled(sample::Zones<'a>),
+    Scanned(&'a octree::Octree, &'a [DVec3]),
+}
+
+impl Sampler<'_> {
+    /// The points of a range, which begins at a multiple of [`Scene::BLOCK`] and ends at another or at the last point.
+    /// `progress` is told from any thread.
+    ///
+    /// # Panics
+    /// If the range is another.
+    ///
+    /// # Errors
+    /// [`Error::BadScene`] if memory does not suffice, and [`Error::Cancelled`] if `progress` says so.
+    pub fn part(&self, range: Range<usize>, progress: &dyn Progress) -> Result<PointCloud, Error> {
+        let Range { start, end } = range;
+        let whole = start.is_multiple_of(Scene::BLOCK) && (end.is_multiple_of(Scene::BLOCK) || end == self.count);
+        assert!(whole && start <= end && end <= self.count, "points {range:?} of {}", self.count);
+        let count = range.len();
+        // A failed reservation becomes an error. The zeroed vectors below would abort the process instead.
+        if Vec::<[u8; 15]>::new().try_reserve_exact(count).is_err() {
+            return Err(self.scene.refuse(self.count, "not enough memory for so many points"));
+        }
+        let (mut positions, mut colors) = (vec![[0.0; 3]; count], vec![[0; 3]; count]);
+        let finished = match &self.way {
+            Way::Sampled(zones) => zones.sample(start, &mut positions, &mut colors, progress),
+            Way::Scanned(tree, stations) => {
+                scan::scan(tree, stations, self.count, start, &mut positions, &mut colors, progress)
+            }
+        };
+        if !finished {
+            return Err(Error::Cancelled);
+        }
+        PointCloud::new(DVec3::ZERO, positions).with_axes(Axes::ZUp).with_colors(colors)
+    }
+}
+
 impl Scene {
+    /// Points that are generated together, with random numbers of their own.
+    pub const BLOCK: usize = sample::BLOCK;
+
     /// Period of all animations, in seconds.
     pub const PERIOD: f64 = 2.0;
 
@@ -138,24 +187,39 @@ impl Scene {
     /// [`Error::BadScene`] if `count` is above [`Self::MAX_COUNT`] or memory does not suffice, and
     /// [`Error::Cancelled`] if `progress` says so.
     pub fn sample(&self, count: usize, progress: &dyn Progress) -> Result<PointCloud, Error> {
-        let refuse = |why: &str| Error::BadScene { given: format!("{}:{count}", self.name()), why: why.into() };
+        self.sampler(count)?.part(0..count, progress)
+    }
+
+    /// Prepares sampling of `count` points, of which parts can be made one by one.
+    ///
+    /// # Errors
+    /// [`Error::BadScene`] if `count` is above [`Self::MAX_COUNT`].
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats_scenes::Scene;
+    ///
+    /// let (scene, count) = Scene::parse("statue:40K")?;
+    /// let sampler = scene.sampler(count)?;
+    /// let part = sampler.part(2 * Scene::BLOCK..count, &())?;
+    /// assert_eq!(part.positions(), &scene.sample(count, &())?.positions()[2 * Scene::BLOCK..]);
+    /// # Ok::<(), autosplats_cloud::Error>(())
+    /// ```
+    pub fn sampler(&self, count: usize) -> Result<Sampler<'_>, Error> {
         if count > Self::MAX_COUNT {
-            return Err(refuse("a scene has at most 1G points"));
+            return Err(self.refuse(count, "a scene has at most 1G points"));
         }
-        // A failed reservation becomes an error. The zeroed vectors below would abort the process instead.
-        if Vec::<[u8; 15]>::new().try_reserve_exact(count).is_err() {
-            return Err(refuse("not enough memory for so many points"));
-        }
-        let (mut positions, mut colors) = (vec![[0.0; 3]; count], vec![[0; 3]; count]);
         let Model { tree, points } = self.model();
-        let finished = match points {
-            Points::Sampled(shares) => sample::sample_surface(tree, shares, &mut positions, &mut colors, progress),
-            Points::Scanned(stations) => scan::scan(tree, stations, &mut positions, &mut colors, progress),
+        let way = match points {
+            Points::Sampled(shares) => Way::Sampled(sample::Zones::new(tree, shares)),
+            Points::Scanned(stations) => Way::Scanned(tree, stations),
         };
-        if !finished {
-            return Err(Error::Cancelled);
-        }
-        PointCloud::new(DVec3::ZERO, positions).with_axes(Axes::ZUp).with_colors(colors)
+        Ok(Sampler { scene: self, count, way })
+    }
+
+    fn refuse(&self, count: usize, why: &str) -> Error {
+        Error::BadScene { given: format!("{}:{count}", self.name()), why: why.into() }
     }
 
     /// First intersection of a ray with the surface, from outside or from within a solid.
@@ -166,12 +230,7 @@ impl Scene {
     }
 
     /// Like [`trace`](Self::trace), but searches only the distances `within`, and returns only distance and colour.
-    pub(crate) fn trace_within(
-        &self,
-        origin: DVec3,
-        direction: DVec3,
-        within: std::ops::Range<f64>,
-    ) -> Option<(f64, [f32; 3])> {
+    pub(crate) fn trace_within(&self, origin: DVec3, direction: DVec3, within: Range<f64>) -> Option<(f64, [f32; 3])> {
         let tree = &self.model().tree;
         let crossing = tree.trace(origin, direction, within)?;
         Some((crossing.distance, tree.rgb(&crossing)))

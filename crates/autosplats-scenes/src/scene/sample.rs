@@ -16,11 +16,13 @@ use rayon::prelude::*;
 use super::octree::{Leaf, Octree};
 
 /// Points per random stream.
-const BLOCK: usize = 16384;
+pub(super) const BLOCK: usize = 16384;
 
-/// Fills `positions` and `colors` block by block, in parallel. `block` gets the index of its first point and returns
-/// false if it cannot fill the block. Returns whether all blocks are filled.
+/// Fills `positions` and `colors` block by block, in parallel: those of the points from `start` on, which begins a
+/// block. `block` gets the index of its first point and returns false if it cannot fill the block. Returns whether all
+/// blocks are filled.
 pub(super) fn by_blocks(
+    start: usize,
     positions: &mut [[f32; 3]],
     colors: &mut [[u8; 3]],
     progress: &dyn Progress,
@@ -32,7 +34,7 @@ pub(super) fn by_blocks(
         if stop.load(Ordering::Relaxed) {
             return;
         }
-        let filled = block(i * BLOCK, points, colors);
+        let filled = block(start + i * BLOCK, points, colors);
         let done = done.fetch_add(points.len(), Ordering::Relaxed) + points.len();
         if !filled || progress.tick(done as f32 / total).is_err() {
             stop.store(true, Ordering::Relaxed);
@@ -106,39 +108,52 @@ pub(super) fn random_of(number: u64) -> Random {
     Random::from_state(seed)
 }
 
-/// Samples a share `shares[zone]` of the points on each zone. Returns false if cancelled or if a zone has no surface.
-pub(super) fn sample_surface(
-    tree: &Octree,
-    shares: &[f64],
-    positions: &mut [[f32; 3]],
-    colors: &mut [[u8; 3]],
-    progress: &dyn Progress,
-) -> bool {
-    let zones: Vec<_> = (0..tree.body().zones()).map(|zone| Zone::new(tree, zone)).collect();
-    // Number of points among the first `count` that lie in zones up to and including `zone`.
-    let upto = |count: usize, zone: usize| {
-        let share = if zone + 1 == zones.len() { 1.0 } else { shares[..=zone].iter().sum::<f64>() };
+/// The cells of a body's zones, and the shares of the points that each zone gets.
+pub(super) struct Zones<'a> {
+    tree: &'a Octree,
+    shares: &'a [f64],
+    zones: Vec<Zone>,
+}
+
+impl<'a> Zones<'a> {
+    pub(super) fn new(tree: &'a Octree, shares: &'a [f64]) -> Self {
+        Self { tree, shares, zones: (0..tree.body().zones()).map(|zone| Zone::new(tree, zone)).collect() }
+    }
+
+    /// Number of points among the first `count` that lie in zones up to and including `zone`.
+    fn upto(&self, count: usize, zone: usize) -> usize {
+        let share = if zone + 1 == self.zones.len() { 1.0 } else { self.shares[..=zone].iter().sum::<f64>() };
         (count as f64 * share).round() as usize
-    };
-    by_blocks(positions, colors, progress, |first, points, colors| {
-        let mut random = random_of(first as u64);
-        let end = first + points.len();
-        let mut slots = points.iter_mut().zip(colors);
-        let mut before = 0;
-        for (zone, cells) in zones.iter().enumerate() {
-            let all = upto(end, zone) - upto(first, zone);
-            let need = all - before;
-            before = all;
-            let filled = cells.fill(tree, zone, need, &mut random);
-            if filled.len() < need {
-                return false;
+    }
+
+    /// Samples the points from `start` on. Returns false if cancelled or if a zone has no surface.
+    pub(super) fn sample(
+        &self,
+        start: usize,
+        positions: &mut [[f32; 3]],
+        colors: &mut [[u8; 3]],
+        progress: &dyn Progress,
+    ) -> bool {
+        by_blocks(start, positions, colors, progress, |first, points, colors| {
+            let mut random = random_of(first as u64);
+            let end = first + points.len();
+            let mut slots = points.iter_mut().zip(colors);
+            let mut before = 0;
+            for (zone, cells) in self.zones.iter().enumerate() {
+                let all = self.upto(end, zone) - self.upto(first, zone);
+                let need = all - before;
+                before = all;
+                let filled = cells.fill(self.tree, zone, need, &mut random);
+                if filled.len() < need {
+                    return false;
+                }
+                for ((p, rgb), (point, color)) in filled.into_iter().zip(&mut slots) {
+                    (*point, *color) = (p, rgb);
+                }
             }
-            for ((p, rgb), (point, color)) in filled.into_iter().zip(&mut slots) {
-                (*point, *color) = (p, rgb);
-            }
-        }
-        true
-    })
+            true
+        })
+    }
 }
 
 type PaintedPoint = ([f32; 3], [u8; 3]);

@@ -11,19 +11,22 @@ use super::sample::{by_blocks, quantize, random_of};
 /// Lowest elevation of a ray, in radians; the tripod hides everything below.
 const MIN_ELEVATION_RAD: f64 = -60.0 / 180.0 * std::f64::consts::PI;
 
-/// Scans the inside of a closed scene, with an equal share of the points from each of `stations`. Rays are jittered
-/// within equal steps of azimuth and elevation. Returns false if cancelled or if rays leave the scene.
+/// Scans the inside of a closed scene, with an equal share of `count` points from each of `stations`: the points from
+/// `start` on. Rays are jittered within equal steps of azimuth and elevation. Returns false if cancelled or if rays
+/// leave the scene.
 pub(super) fn scan(
     tree: &Octree,
     stations: &[DVec3],
+    count: usize,
+    start: usize,
     positions: &mut [[f32; 3]],
     colors: &mut [[u8; 3]],
     progress: &dyn Progress,
 ) -> bool {
-    let per_station = positions.len().div_ceil(stations.len()).max(1);
+    let per_station = count.div_ceil(stations.len()).max(1);
     // The scanner measures one vertical profile after another while its head turns.
     let profile = ((per_station as f64 * (FRAC_PI_2 - MIN_ELEVATION_RAD) / TAU).sqrt().ceil() as usize).max(1);
-    by_blocks(positions, colors, progress, |first, points, colors| {
+    by_blocks(start, positions, colors, progress, |first, points, colors| {
         for (i, (point, color)) in (first..).zip(points.iter_mut().zip(colors)) {
             let mut random = random_of(i as u64);
             let (station, ray) = (i / per_station, i % per_station);

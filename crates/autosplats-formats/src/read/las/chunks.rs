@@ -23,6 +23,17 @@ pub(crate) const MAX_RATIO: usize = 1024;
 /// Points decompressed between two checks for cancellation.
 const CHECKED: usize = 1 << 16;
 
+/// How far chunks are looked at to find them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Look {
+    /// The table alone, where it can be used.
+    Table,
+    /// The beginnings of the chunks too.
+    Starts,
+    /// Points are decompressed if nothing else tells their number.
+    Points,
+}
+
 /// A run of records that can only be decompressed from its beginning.
 pub(super) struct Chunk {
     pub(super) bytes: Range<usize>,
@@ -43,13 +54,13 @@ pub(super) struct Chunks {
 }
 
 impl Chunks {
-    /// Finds the chunks. Later code trusts only what is checked here. Unless `thorough`, nothing is decompressed.
+    /// Finds the chunks. Later code trusts only what is checked here.
     pub(super) fn find(
         job: &Job<'_>,
         header: &Header,
         vlr: &LazVlr,
         chunked: bool,
-        thorough: bool,
+        look: Look,
     ) -> Result<Self, String> {
         let stated = usize::try_from(header.stated).map_err(|_| "too many points".to_owned())?;
         if !chunked {
@@ -67,7 +78,7 @@ impl Chunks {
             start: header.point_data + 8,
             stated: (stated > 0).then_some(stated),
             size: (!variable).then_some(vlr.chunk_size() as usize),
-            thorough,
+            look,
         };
         let table = search.table(header.point_data);
         let by_table = match table {
@@ -109,7 +120,7 @@ struct Search<'a> {
     stated: Option<usize>,
     /// Points of each chunk but the last; `None` if their number varies.
     size: Option<usize>,
-    thorough: bool,
+    look: Look,
 }
 
 impl Search<'_> {
@@ -136,6 +147,7 @@ impl Search<'_> {
         let entries = entries.as_ref();
 
         let mut list: Vec<Chunk> = Vec::new();
+        let looks = self.look != Look::Table;
         let mut more = false;
         let (mut at, mut left) = (self.start, self.stated.unwrap_or(usize::MAX));
         for (index, entry) in entries.iter().enumerate() {
@@ -143,7 +155,7 @@ impl Search<'_> {
             let end = usize::try_from(entry.byte_count).ok().and_then(|len| at.checked_add(len));
             let end = end.filter(|&end| end <= table).ok_or_else(|| fail("reaches beyond the points"))?;
             let chunk = &bytes[at..end];
-            let own = self.layers(chunk).map(|(points, _)| points);
+            let own = if looks { self.layers(chunk).map(|(points, _)| points) } else { None };
             let held = match self.size {
                 None => usize::try_from(entry.point_count).unwrap_or(usize::MAX),
                 Some(size) if self.stated.is_some() => size,
@@ -158,7 +170,7 @@ impl Search<'_> {
             more |= end > at && known.map_or(left == 0, |known| known > left);
             let points = held.min(left);
             if points > 0 {
-                let inconsistent = layered(self.items) && own.is_none();
+                let inconsistent = looks && layered(self.items) && own.is_none();
                 list.push(Chunk { bytes: at..end, points, inconsistent });
             }
             at = end;
@@ -178,7 +190,8 @@ impl Search<'_> {
                 self.layers(rest)
             } else {
                 // Only what follows shows that the last chunk is whole: the table, or other data.
-                let size = self.size.map(|size| size.min(left)).filter(|_| self.thorough && self.stated.is_some());
+                let size =
+                    self.size.map(|size| size.min(left)).filter(|_| self.look == Look::Points && self.stated.is_some());
                 let whole = |len: &usize| table.is_some() || *len < rest.len();
                 size.and_then(|size| Some((size, self.len_of(rest, size).filter(whole)?)))
             };
@@ -216,7 +229,7 @@ impl Search<'_> {
     fn points_in(&self, chunk: &[u8], size: usize) -> usize {
         let Ok(mut records) = decompressor(self.items, chunk) else { return 0 };
         let mut record = vec![0; self.record_len];
-        let most = if self.thorough { size.min(MAX_RATIO.saturating_mul(chunk.len())) } else { 0 };
+        let most = if self.look == Look::Points { size.min(MAX_RATIO.saturating_mul(chunk.len())) } else { 0 };
         (0..most)
             .take_while(|index| {
                 let checked = index % CHECKED == 0 && self.job.progress.cancelled();

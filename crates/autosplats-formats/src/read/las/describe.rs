@@ -4,6 +4,7 @@ use autosplats_cloud::{Error, shown_number};
 
 use super::super::{Attribute, Description, Job};
 use super::{
+    chunks::Look,
     coordinates::{self, CoordinateSystem},
     dimension::{Dimension, Source, dimensions},
     header::{Header, bytes_at},
@@ -95,7 +96,8 @@ fn points(job: &Job<'_>, header: &mut Header, records: &Records<'_>, notes: &mut
         }
         return Some(header.points);
     }
-    match laz::Compressed::open(job, header, records, header.stated == 0) {
+    let look = if header.stated == 0 { Look::Points } else { Look::Starts };
+    match laz::Compressed::open(job, header, records, look) {
         Ok(Some(compressed)) => {
             notes.extend(compressed.note);
             notes.extend(header.more_than_stated(compressed.points));

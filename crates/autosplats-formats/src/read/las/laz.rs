@@ -17,7 +17,7 @@ use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr, record::RecordDe
 
 use super::super::Job;
 use super::{
-    chunks::{Chunk, Chunks, MAX_RATIO, layers},
+    chunks::{Chunk, Chunks, Look, MAX_RATIO, layers},
     columns::{BATCH, Columns, Piece, preview},
     decompressor::{Decompressor, DynDecompressor, layered, selecting},
     header::Header,
@@ -42,13 +42,13 @@ pub(super) struct Compressed<'a> {
     bytes: &'a [u8],
     /// How the records are compressed.
     pub(super) layout: Layout,
-    chunks: Vec<Chunk>,
+    pub(super) chunks: Vec<Chunk>,
 }
 
 /// How records are compressed, and which of their values are decompressed.
 #[derive(Clone)]
 pub(super) struct Layout {
-    items: Vec<LazItem>,
+    pub(super) items: Vec<LazItem>,
     record_len: usize,
     /// Whether the records are in chunks.
     chunked: bool,
@@ -56,12 +56,12 @@ pub(super) struct Layout {
 }
 
 impl<'a> Compressed<'a> {
-    /// Finds the chunks; `None` if there are no points. Unless `thorough`, nothing is decompressed.
+    /// Finds the chunks; `None` if there are no points.
     pub(super) fn open(
         job: &Job<'a>,
         header: &Header,
         records: &Records<'a>,
-        thorough: bool,
+        look: Look,
     ) -> Result<Option<Self>, Error> {
         if header.stated == 0 && header.end <= header.point_data + header.record_len {
             return Ok(None);
@@ -73,7 +73,7 @@ impl<'a> Compressed<'a> {
             return Err(fail(format!("{} points cannot be in a file of this size", header.stated)));
         }
         let Chunks { list: chunks, more, note, .. } =
-            guard(|| Chunks::find(job, header, &vlr, layout.chunked, thorough)).map_err(fail)?;
+            guard(|| Chunks::find(job, header, &vlr, layout.chunked, look)).map_err(fail)?;
         let points = chunks.iter().map(|chunk| chunk.points).sum();
         if points > most {
             return Err(fail(format!("{points} points cannot be in a file of this size")));
@@ -319,7 +319,7 @@ fn check_items(items: &[LazItem], header: &Header) -> Result<(), String> {
 }
 
 /// Decompresses the next records. An error holds the number of complete records before it.
-fn decompress(
+pub(super) fn decompress(
     decompressor: &mut (dyn RecordDecompressor<Cursor<&[u8]>> + Send + Sync),
     records: &mut [u8],
     len: usize,

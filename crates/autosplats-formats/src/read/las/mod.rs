@@ -24,18 +24,21 @@ mod point14;
 mod records;
 mod shape;
 mod slices;
+mod stream;
 
 pub(crate) use self::{
     chunks::MAX_RATIO,
     columns::{Colors, narrow_note},
     head::Head,
     shape::{Decoded, Shape, read_shaped},
+    stream::{Facts, Space, Stream},
 };
 
 use autosplats_cloud::{Contents, Error, Unit, degree_origin, sampled_middle};
 use glam::DVec3;
 
 use self::{
+    chunks::Look,
     columns::{BATCH, Columns, preview},
     dimension::{Dimension, dimensions},
     header::Header,
@@ -70,7 +73,7 @@ fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
     let (mut dimensions, mut notes) = dimensions(&header, &records);
     shape.choose(&mut dimensions);
     notes.extend(records.notes.iter().cloned());
-    let mut compressed = if header.compressed { Compressed::open(job, &header, &records, true)? } else { None };
+    let mut compressed = if header.compressed { Compressed::open(job, &header, &records, Look::Points)? } else { None };
     if let Some(compressed) = &mut compressed {
         compressed.layout.selection = shape.selection(&dimensions);
     }

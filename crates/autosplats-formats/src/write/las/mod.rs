@@ -9,17 +9,24 @@
 mod grid;
 mod header;
 mod plan;
+mod shape;
 
 use std::{
     fs::File,
     io::{BufWriter, Seek as _, SeekFrom, Write as _},
+    path::Path,
 };
 
 use autosplats_cloud::Error;
 use laz::{LazItemRecordBuilder, LazVlr, LazVlrBuilder, ParLasZipCompressor};
 use rayon::prelude::*;
 
-use self::{header::Totals, plan::Plan};
+pub(super) use self::header::{Head, Record, Totals, compression_record, crs_records, extra_records, today};
+use self::shape::choose;
+pub(super) use self::{
+    plan::{Plan, finite},
+    shape::{Shape, Survey},
+};
 use super::{Format, Job};
 
 pub(super) const LAS: Format = Format { name: "LAS", extensions: &["las"], write: |job, file| write(job, file, false) };
@@ -32,11 +39,14 @@ const CHUNK: usize = 50_000;
 const PIECE: usize = 1 << 12;
 
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>, compressed: bool) -> Result<(), Error> {
-    let plan = Plan::of(job)?;
+    let survey = Survey::of(job.cloud);
+    survey.note_losses(job.progress);
+    let shape = Shape::of(&survey, choose(&survey), job.path, job.progress)?;
+    let plan = Plan::of(job, &survey, &shape)?;
     let vlr = if compressed { Some(compression(job, &plan)?) } else { None };
     let mut totals = Totals::new();
     let io = |source| job.io(source);
-    let (head, start) = header::bytes(&plan, &totals, vlr.as_ref());
+    let (head, start) = header::bytes(&plan, &survey, &shape, &totals, vlr.as_ref());
     debug_assert_eq!(head.len(), start, "the points follow the records");
     file.write_all(&head).map_err(io)?;
     match vlr.clone() {
@@ -48,7 +58,7 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>, compressed: bool) -> Re
         }
         None => encode(job, &plan, CHUNK * 4, &mut totals, |records| file.write_all(records).map_err(io))?,
     }
-    let (head, _) = header::bytes(&plan, &totals, vlr.as_ref());
+    let (head, _) = header::bytes(&plan, &survey, &shape, &totals, vlr.as_ref());
     file.seek(SeekFrom::Start(0)).map_err(io)?;
     file.write_all(&head).map_err(io)
 }
@@ -60,7 +70,12 @@ fn compression(job: &Job<'_>, plan: &Plan<'_>) -> Result<LazVlr, Error> {
 }
 
 fn failed(job: &Job<'_>, error: &laz::LasZipError) -> Error {
-    job.io(std::io::Error::other(error.to_string()))
+    failed_packing(job.path, error)
+}
+
+/// The error of the compressor, which is one of the operating system.
+pub(super) fn failed_packing(path: &Path, error: &laz::LasZipError) -> Error {
+    Error::Io { path: path.into(), source: std::io::Error::other(error.to_string()) }
 }
 
 /// Passes the records of all points to `hand_on`, batch by batch.
@@ -78,7 +93,7 @@ fn encode(
         let piece = |(index, records): (usize, &mut [u8])| {
             let first = start + index * PIECE;
             plan.encode(records, |i| plan.point(first + i));
-            Totals::of(records, plan)
+            Totals::of(records, plan.record_len, plan.is_wide())
         };
         let parts: Vec<Totals> = records.par_chunks_mut(PIECE * plan.record_len).enumerate().map(piece).collect();
         parts.iter().for_each(|part| totals.add(part));

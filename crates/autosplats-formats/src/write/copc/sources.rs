@@ -1,0 +1,328 @@
+//! The inputs as records of the tree.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+};
+
+use autosplats_cloud::{Crs, Error, PointCloud, Progress};
+use rayon::prelude::*;
+
+use super::{
+    TreeOptions,
+    choose::Chosen,
+    distribute::Bounds,
+    extras::Extras,
+    frame::{Lattice, steps_of},
+    recode::Recoder,
+    schema::{Holds, Schema},
+    spill::lock,
+};
+use crate::{
+    las,
+    read::las::{Facts, Space, Stream},
+    write::las::{Plan, Shape, Survey, finite},
+};
+
+/// Points of a cloud that one thread encodes at a time.
+const PIECE: usize = 1 << 16;
+
+/// Points that come as clouds, one after another.
+pub trait Clouds: Sync + Send {
+    /// Name of the input.
+    fn name(&self) -> &Path;
+
+    /// Passes on all points, in clouds that have the same fields. Clouds may come from any thread. Points are asked for
+    /// several times, and are the same each time.
+    ///
+    /// # Errors
+    /// Those of `take` and of reading.
+    fn read(
+        &self,
+        progress: &dyn Progress,
+        take: &(dyn Fn(&PointCloud) -> Result<(), Error> + Sync),
+    ) -> Result<(), Error>;
+}
+
+/// What a tree is made of.
+pub enum TreeInput<'a> {
+    /// A LAS or LAZ file.
+    Las(PathBuf),
+    /// Other points.
+    Clouds(Box<dyn Clouds + 'a>),
+}
+
+/// An open input.
+pub(super) enum Source<'a> {
+    Las(Stream),
+    Clouds { clouds: Box<dyn Clouds + 'a>, survey: Mutex<Option<Survey>> },
+}
+
+/// A source with what makes its records those of the tree.
+pub(super) struct Prepared<'a> {
+    source: Source<'a>,
+    shape: Option<Shape>,
+    lattice: Lattice,
+    recoder: Recoder,
+    /// Number of points that cannot be read, and why.
+    lost: Mutex<(u64, String)>,
+    chosen: Chosen,
+}
+
+/// A progress that reports nothing, since points are read several times, but cancels.
+struct Quiet<'a>(&'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn report(&self, _fraction: f32) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}
+
+impl<'a> Source<'a> {
+    pub(super) fn open(input: TreeInput<'a>) -> Result<Self, Error> {
+        match input {
+            TreeInput::Las(path) => match Stream::open(&path)? {
+                Some(stream) => Ok(Self::Las(stream)),
+                None => Err(Error::malformed(&path, "byte 0", "a LAS file begins with 'LASF'; this one does not")),
+            },
+            TreeInput::Clouds(clouds) => Ok(Self::Clouds { clouds, survey: Mutex::default() }),
+        }
+    }
+
+    /// What the input holds. Unless its header states possible bounds, all points are read for it.
+    pub(super) fn holds(&self, progress: &dyn Progress) -> Result<Holds, Error> {
+        match self {
+            Self::Las(stream) => holds_of(stream, progress),
+            Self::Clouds { clouds, survey } => {
+                let (holds, found) = survey_of(&**clouds, progress)?;
+                *lock(survey) = found;
+                Ok(holds)
+            }
+        }
+    }
+
+    /// Tells what is odd about the input.
+    pub(super) fn tell(&self, several: bool, progress: &dyn Progress) {
+        if let Self::Las(stream) = self {
+            stream.facts.notes.iter().for_each(|note| progress.note(&about(&stream.path, several, note)));
+        }
+    }
+
+    pub(super) fn prepare(
+        self,
+        schema: &Schema,
+        options: &TreeOptions,
+        progress: &dyn Progress,
+    ) -> Result<Prepared<'a>, Error> {
+        let (name, shape, format, record_len, descriptors, lattice) = match &self {
+            Self::Las(stream) => {
+                let Facts { format, record_len, ref extras, .. } = stream.facts;
+                (stream.path.clone(), None, format, record_len, extras.clone(), lattice_of(&stream.facts))
+            }
+            Self::Clouds { clouds, survey } => {
+                let name = clouds.name();
+                let survey = lock(survey);
+                let shape = survey.as_ref().map(|survey| Shape::of(survey, survey.tree_format(), name, progress));
+                let shape = shape.transpose()?;
+                let (format, len, descriptors) = shape
+                    .as_ref()
+                    .map_or((6, las::RECORD_LEN[6], Vec::new()), |s| (s.format, s.record_len, s.descriptors.clone()));
+                (name.to_owned(), shape, format, len, descriptors, schema.lattice)
+            }
+        };
+        let extras = Extras::of(record_len - las::RECORD_LEN[format], &descriptors);
+        let recoder = Recoder::new(name, format, record_len, &lattice, &extras, schema);
+        let keep = options.keep.clone().filter(|_| matches!(self, Self::Las(_)));
+        let chosen = Chosen::new(options.bounds, keep, schema);
+        Ok(Prepared { source: self, shape, lattice, recoder, lost: Mutex::default(), chosen })
+    }
+}
+
+fn lattice_of(facts: &Facts) -> Lattice {
+    Lattice { scale: facts.scale, offset: facts.offset }
+}
+
+fn holds_of(stream: &Stream, progress: &dyn Progress) -> Result<Holds, Error> {
+    let Facts { format, record_len, points, standard_time, created, ref crs, ref extras, .. } = stream.facts;
+    let lattice = lattice_of(&stream.facts);
+    let bounds = match stream.facts.bounds {
+        Some(bounds) => bounds,
+        None => read_bounds(stream, progress)?.corners().map(|corner| lattice.world(corner)),
+    };
+    // A negative step turns lowest and highest around.
+    let bounds = [bounds[0].min(bounds[1]), bounds[0].max(bounds[1])];
+    Ok(Holds {
+        name: stream.path.clone(),
+        points,
+        colors: las::colors(format).is_some(),
+        infrared: matches!(format, 8 | 10),
+        lattice: Some(lattice),
+        bounds,
+        extras: Extras::of(record_len - las::RECORD_LEN[format], extras),
+        crs: crs.clone(),
+        standard_time: las::time(format).is_some().then_some(standard_time),
+        created: Some(created),
+    })
+}
+
+fn read_bounds(stream: &Stream, progress: &dyn Progress) -> Result<Bounds, Error> {
+    let bounds = Mutex::new(Bounds::NONE);
+    (0..stream.runs()).into_par_iter().try_for_each(|run| {
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let mut own = Bounds::NONE;
+        stream.read(run, &mut Space::default(), &mut |records| {
+            records.chunks_exact(stream.facts.record_len).for_each(|record| own.add(steps_of(record)));
+            Ok(())
+        })?;
+        lock(&bounds).join(&own);
+        Ok(())
+    })?;
+    Ok(bounds.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// Reads all points for what they hold.
+fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Option<Survey>), Error> {
+    let found: Mutex<Option<(Survey, Crs)>> = Mutex::default();
+    clouds.read(progress, &|cloud| {
+        if cloud.is_empty() {
+            return Ok(());
+        }
+        let own = Survey::of(cloud);
+        let mut found = lock(&found);
+        match &mut *found {
+            Some((all, _)) => all.add(own).map_err(|what| Error::unsupported(clouds.name(), what))?,
+            None => *found = Some((own, cloud.crs().clone())),
+        }
+        Ok(())
+    })?;
+    let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let mut holds = Holds {
+        name: clouds.name().to_owned(),
+        points: 0,
+        colors: false,
+        infrared: false,
+        lattice: None,
+        bounds: [glam::DVec3::ZERO; 2],
+        extras: Extras::default(),
+        crs: Crs::default(),
+        standard_time: None,
+        created: None,
+    };
+    let Some((survey, crs)) = found else { return Ok((holds, None)) };
+    survey.note_losses(progress);
+    let shape = Shape::of(&survey, survey.tree_format(), clouds.name(), &())?;
+    holds.points = survey.points as u64;
+    (holds.colors, holds.infrared) = (survey.colored, shape.format == 8);
+    holds.bounds = survey.bounds;
+    holds.extras = Extras::of(shape.record_len - las::RECORD_LEN[shape.format], &shape.descriptors);
+    (holds.crs, holds.standard_time) = (crs, survey.standard_time());
+    Ok((holds, Some(survey)))
+}
+
+/// A note about one of several inputs.
+fn about(path: &Path, several: bool, note: &str) -> String {
+    if several { format!("{}: {note}", path.display()) } else { note.into() }
+}
+
+impl Prepared<'_> {
+    /// Whether the points come as clouds.
+    pub(super) fn is_clouds(&self) -> bool {
+        matches!(self.source, Source::Clouds { .. })
+    }
+
+    /// Passes on all points as records of the tree, from several threads.
+    pub(super) fn read(
+        &self,
+        progress: &dyn Progress,
+        take: &(dyn Fn(&[u8]) -> Result<(), Error> + Sync),
+    ) -> Result<(), Error> {
+        match (&self.source, &self.shape) {
+            (Source::Las(stream), _) => self.read_records(stream, progress, take),
+            (Source::Clouds { clouds, .. }, Some(shape)) => {
+                clouds.read(&Quiet(progress), &|cloud| self.encode(cloud, shape, progress, take))
+            }
+            (Source::Clouds { .. }, None) => Ok(()),
+        }
+    }
+
+    fn read_records(
+        &self,
+        stream: &Stream,
+        progress: &dyn Progress,
+        take: &(dyn Fn(&[u8]) -> Result<(), Error> + Sync),
+    ) -> Result<(), Error> {
+        let spaces: Mutex<Vec<(Space, Vec<u8>)>> = Mutex::default();
+        (0..stream.runs()).into_par_iter().try_for_each(|run| {
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            let (mut space, mut records) = lock(&spaces).pop().unwrap_or_default();
+            let lost = stream.read(run, &mut space, &mut |piece| {
+                records.clear();
+                self.recoder.recode(piece, &mut records)?;
+                self.chosen.retain(&mut records);
+                take(&records)
+            })?;
+            lock(&spaces).push((space, records));
+            if lost.points > 0 {
+                let mut all = lock(&self.lost);
+                all.0 += lost.points;
+                // The order of the threads does not matter.
+                if all.1.is_empty() || lost.why < all.1 {
+                    all.1 = lost.why;
+                }
+            }
+            Ok(())
+        })
+    }
+
+    fn encode(
+        &self,
+        cloud: &PointCloud,
+        shape: &Shape,
+        progress: &dyn Progress,
+        take: &(dyn Fn(&[u8]) -> Result<(), Error> + Sync),
+    ) -> Result<(), Error> {
+        let plan = Plan::bind(cloud, shape, self.lattice.scale, self.lattice.offset, finite(cloud));
+        (0..plan.points().div_ceil(PIECE)).into_par_iter().try_for_each(|piece| {
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            let first = piece * PIECE;
+            let mut records = vec![0; PIECE.min(plan.points() - first) * shape.record_len];
+            plan.encode(&mut records, |index| plan.point(first + index));
+            let mut recoded = Vec::new();
+            self.recoder.recode(&records, &mut recoded)?;
+            self.chosen.retain(&mut recoded);
+            take(&recoded)
+        })
+    }
+
+    /// Forgets which points were lost or left out, since all are read again.
+    pub(super) fn forget(&self) {
+        *lock(&self.lost) = (0, String::new());
+        self.chosen.forget();
+    }
+
+    /// Tells which points could not be read, and which were left out.
+    pub(super) fn tell_lost(&self, several: bool, progress: &dyn Progress) -> Result<(), Error> {
+        let Source::Las(stream) = &self.source else { return Ok(()) };
+        let (lost, why) = std::mem::take(&mut *lock(&self.lost));
+        let all = stream.facts.points;
+        if lost > 0 && lost == all {
+            return Err(Error::malformed(&stream.path, "point 1", why));
+        }
+        if lost > 0 {
+            let note = format!("compressed data are damaged: {lost} of {all} points are lost; copy the file again");
+            progress.note(&about(&stream.path, several, &note));
+        }
+        if let Some(note) = self.chosen.note() {
+            progress.note(&about(&stream.path, several, &note));
+        }
+        Ok(())
+    }
+}
