@@ -54,7 +54,7 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         seeds("xyz", [written("xyz")?, vec![rows.clone().into_bytes()]].concat()),
         seeds("pts", [written("pts")?, vec![format!("{POINTS}\n{rows}").into_bytes()]].concat()),
         seeds("csv", [written("csv")?, vec![odd_csv(), grouped_csv()]].concat()),
-        seeds("xyz.gz", vec![gzip(rows.as_bytes())?, [gzip(rows.as_bytes())?, gzip(positions.as_bytes())?].concat()]),
+        seeds("xyz.gz", vec![gzip(rows.as_bytes())?, [gzip(rows.as_bytes())?, gzip(rows.as_bytes())?].concat()]),
         seeds("las.gz", las(false)?.iter().map(|file| gzip(file)).collect::<Result<_>>()?),
         seeds("grd", vec![grid()]),
         seeds("obj", vec![format!("# a\ng b\n{vertices}{}", faces("f", 1)).into_bytes(), odd_obj()]),
