@@ -106,6 +106,27 @@ fn a_view_that_moves_has_what_it_needs_when_it_rests() {
     window.harness.state_mut().run(Command::FitAll, &context);
     window.settle();
     assert_eq!(nodes(layer(&window)), chosen(&window, 1.0), "and back");
+
+    // A picture in haste has the nodes that show most.
+    let shown = &window.app().view.shot.as_ref().expect("a picture").shown;
+    let tree = layer(&window).tree.as_ref().expect("an octree");
+    let rank = |point: u32| {
+        let (key, _) = tree.place_of(point as usize).expect("of a node");
+        tree.nodes.iter().find(|node| node.key == key).expect("loaded").rank
+    };
+    let mut more = shown.len();
+    for halvings in 1..4 {
+        let part = shown.thinned(halvings);
+        let last = part.iter().map(|&point| rank(point)).max().expect("some points");
+        assert!(part.is_sorted() && part.len() < more, "{} of {more}", part.len());
+        let all = (0..shown.len() as u32).filter(|&point| rank(point) <= last).count();
+        assert!(
+            part.len() == all && (last == 0 || all <= shown.len() >> halvings),
+            "whole nodes: {} {all}",
+            part.len()
+        );
+        more = part.len() + 1;
+    }
 }
 
 #[test]

@@ -51,7 +51,12 @@ impl View {
                 self.rate.count(now, &picture);
                 self.failure = None;
                 self.moving_points = picture.most_points.unwrap_or(self.moving_points);
-                self.shot = Some(picture);
+                let cloud = Arc::clone(&picture.shown.cloud);
+                let before = self.shot.replace(picture);
+                if let Some(before) = before.filter(|before| !Arc::ptr_eq(&before.shown.cloud, &cloud)) {
+                    // To free many points takes longer than a window frame may.
+                    crate::threads::spawn("free", move || drop(before));
+                }
             }
             Answer::Finer(image) => {
                 if let Some(shot) = &mut self.shot {

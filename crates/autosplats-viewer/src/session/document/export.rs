@@ -6,11 +6,14 @@ use std::{
     sync::Arc,
 };
 
-use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_memory, glam::DMat4};
-use autosplats_formats::{ReadOptions, check_writable, write};
+use autosplats::cloud::{
+    Error, PointCloud, Progress, Scan, Unit, check_memory,
+    glam::{DMat4, DQuat},
+};
+use autosplats_formats::{Part, ReadOptions, check_writable, write};
 use autosplats_sources::read_tree;
 
-use super::{Document, Layer, LayerId, LayerTree, shown::points_where, tree::part_in};
+use super::{ClipBox, Document, Layer, LayerId, LayerTree, bounds::box_of, shown::points_where};
 
 /// Which points to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,6 +155,21 @@ fn with_trees_read(document: &Document, what: ExportScope, progress: &dyn Progre
         layer.cloud = Arc::new(read_tree(&*open.tree, &part_in(clip.as_ref(), &layer.pose), &options, progress)?);
     }
     Ok(document)
+}
+
+/// The part of an octree that a box in the world needs. The points of a box that is turned or posed have to be tested
+/// once more.
+fn part_in(clip: Option<&ClipBox>, pose: &DMat4) -> Part {
+    let bounds = clip.map(|clip| {
+        if clip.rotation == DQuat::IDENTITY && *pose == DMat4::IDENTITY {
+            return [clip.min, clip.max];
+        }
+        let tree_from_world = pose.inverse();
+        let [low, high] = box_of(clip.corners().map(|corner| tree_from_world.transform_point3(corner)));
+        let slack = 1e-12 * low.abs().max(high.abs());
+        [low - slack, high + slack]
+    });
+    Part { bounds, ..Part::default() }
 }
 
 /// The points of a layer to write; `None` for all.

@@ -13,7 +13,10 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::{Bits, LayerTree, bounds::bounds};
+use super::{
+    Bits, LayerTree,
+    bounds::{bounds, placed_box},
+};
 
 /// Identifies a layer in this process. Clones of a layer, as undo keeps them, have the same id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -139,6 +142,26 @@ impl Layer {
 
     fn loaded_bounds(&self) -> Option<[DVec3; 2]> {
         bounds(self.cloud.len(), |point| self.has(point).then(|| self.position(point)))
+    }
+
+    /// Whether points can be selected and changed: all are there, and all are in memory.
+    pub(crate) fn is_editable(&self) -> bool {
+        !self.incomplete && self.tree.is_none()
+    }
+
+    /// The layer with points that stand for all, whatever of an octree is in memory.
+    pub(super) fn as_sampled(&self) -> Self {
+        let mut layer = self.clone();
+        if let Some(tree) = layer.tree.take() {
+            layer.cloud = Arc::clone(&tree.open.sample);
+        }
+        layer
+    }
+
+    /// Box around all points of an octree, world coordinates, as the file states.
+    pub(super) fn tree_bounds(&self) -> Option<[DVec3; 2]> {
+        let info = self.tree.as_ref()?.open.tree.info();
+        Some(placed_box(info.bounds, &self.pose))
     }
 
     /// Whether a point is neither hidden nor deleted.

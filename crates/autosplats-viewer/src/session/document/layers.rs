@@ -7,7 +7,7 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::{Bits, Counts, Document, Layer, LayerId, bounds_of, layer::Edits};
+use super::{Bits, Counts, Document, Layer, LayerId, LayerTree, bounds_of, layer::Edits};
 
 /// Largest number of points of an overview: enough to find the size of a scene.
 const OVERVIEW_POINT_COUNT: usize = 100_000;
@@ -72,6 +72,28 @@ impl Document {
             layer.local = cloud.local_metres(layer.local.as_ref());
             (layer.cloud, layer.edits, layer.tree) = (Arc::clone(cloud), Edits::default(), None);
         });
+    }
+
+    /// Makes a layer one of an octree. Its points are replaced, and edits of single points dropped.
+    pub(crate) fn set_tree(&mut self, id: LayerId, tree: &LayerTree, cloud: &Arc<PointCloud>) {
+        self.reload(id, cloud);
+        self.layers.iter_mut().filter(|layer| layer.id == id).for_each(|layer| layer.tree = Some(tree.clone()));
+    }
+
+    /// Shows other nodes of an octree. Nothing changes if the layer shows another octree.
+    pub(crate) fn show_nodes(&mut self, id: LayerId, shown: &LayerTree, cloud: &Arc<PointCloud>) {
+        let same = |layer: &&mut Layer| {
+            layer.id == id && layer.tree.as_ref().is_some_and(|tree| Arc::ptr_eq(&tree.open, &shown.open))
+        };
+        for layer in self.layers.iter_mut().filter(same) {
+            layer.cloud = Arc::clone(cloud);
+            layer.tree = Some(shown.clone());
+        }
+    }
+
+    /// The visible layers of octrees.
+    pub(crate) fn trees(&self) -> impl Iterator<Item = (&Layer, &LayerTree)> {
+        self.layers.iter().filter(|layer| layer.visible).filter_map(|layer| Some((layer, layer.tree.as_ref()?)))
     }
 
     /// Hides these points of a layer and shows all others.

@@ -2,13 +2,8 @@
 
 use std::{ops::Range, sync::Arc};
 
-use autosplats::cloud::{
-    Axes, FieldValues, Key, PointCloud, Tree, Wanted,
-    glam::{DMat4, DQuat, DVec3},
-};
-use autosplats_formats::{Part, ReadOptions};
-
-use super::{ClipBox, Document, Layer, LayerId};
+use autosplats::cloud::{Axes, FieldValues, Key, PointCloud, Tree, Wanted};
+use autosplats_formats::ReadOptions;
 
 /// An octree, and how its points are read.
 #[derive(Debug)]
@@ -109,78 +104,4 @@ impl LayerTree {
         leading.sort_unstable_by_key(|points| points.start);
         leading
     }
-}
-
-impl Layer {
-    /// Whether points can be selected and changed: all are there, and all are in memory.
-    pub(crate) fn is_editable(&self) -> bool {
-        !self.incomplete && self.tree.is_none()
-    }
-
-    /// The layer with points that stand for all, whatever of an octree is in memory.
-    pub(super) fn as_sampled(&self) -> Self {
-        let mut layer = self.clone();
-        if let Some(tree) = layer.tree.take() {
-            layer.cloud = Arc::clone(&tree.open.sample);
-        }
-        layer
-    }
-
-    /// Box around all points of an octree, world coordinates, as the file states.
-    pub(super) fn tree_bounds(&self) -> Option<[DVec3; 2]> {
-        let info = self.tree.as_ref()?.open.tree.info();
-        Some(placed_box(info.bounds, &self.pose))
-    }
-}
-
-impl Document {
-    /// Makes a layer one of an octree. Its points are replaced, and edits of single points dropped.
-    pub(crate) fn set_tree(&mut self, id: LayerId, tree: &LayerTree, cloud: &Arc<PointCloud>) {
-        self.reload(id, cloud);
-        self.layers.iter_mut().filter(|layer| layer.id == id).for_each(|layer| layer.tree = Some(tree.clone()));
-    }
-
-    /// Shows other nodes of an octree. Nothing changes if the layer shows another octree.
-    pub(crate) fn show_nodes(&mut self, id: LayerId, shown: &LayerTree, cloud: &Arc<PointCloud>) {
-        let same = |layer: &&mut Layer| {
-            layer.id == id && layer.tree.as_ref().is_some_and(|tree| Arc::ptr_eq(&tree.open, &shown.open))
-        };
-        for layer in self.layers.iter_mut().filter(same) {
-            layer.cloud = Arc::clone(cloud);
-            layer.tree = Some(shown.clone());
-        }
-    }
-
-    /// The visible layers of octrees.
-    pub(crate) fn trees(&self) -> impl Iterator<Item = (&Layer, &LayerTree)> {
-        self.layers.iter().filter(|layer| layer.visible).filter_map(|layer| Some((layer, layer.tree.as_ref()?)))
-    }
-}
-
-/// The part of an octree that a box in the world needs. The points of a box that is turned or posed have to be tested
-/// once more.
-pub(super) fn part_in(clip: Option<&ClipBox>, pose: &DMat4) -> Part {
-    let bounds = clip.map(|clip| {
-        if clip.rotation == DQuat::IDENTITY && *pose == DMat4::IDENTITY {
-            return [clip.min, clip.max];
-        }
-        let tree_from_world = pose.inverse();
-        let [low, high] = box_of(clip.corners().map(|corner| tree_from_world.transform_point3(corner)));
-        let slack = 1e-12 * low.abs().max(high.abs());
-        [low - slack, high + slack]
-    });
-    Part { bounds, ..Part::default() }
-}
-
-fn placed_box([low, high]: [DVec3; 2], matrix: &DMat4) -> [DVec3; 2] {
-    let corner = |at: usize| {
-        let pick = |axis: usize| if at >> axis & 1 == 0 { low[axis] } else { high[axis] };
-        matrix.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
-    };
-    box_of(std::array::from_fn(corner))
-}
-
-fn box_of(corners: [DVec3; 8]) -> [DVec3; 2] {
-    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    corners.into_iter().fold(none, |[low, high], corner| [low.min(corner), high.max(corner)])
 }

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use autosplats::cloud::glam::DMat4;
 use autosplats::cloud::{Error as CloudError, Key, Node, NodeKey, Progress as _, Wanted};
 use autosplats::{Choice, Detail, Error, NodePoints, PlacedTree, choose, load_nodes};
+use rayon::{ThreadPool, ThreadPoolBuilder, current_num_threads};
 
 use super::limits::{Limits, usual_memory};
 use super::mailbox::{Follower, Shared};
@@ -37,6 +38,8 @@ pub(super) struct Loading<'a> {
     /// Number of points that the picture in work needs and that are there.
     there: u64,
     failures: HashMap<usize, Failure>,
+    /// Threads that decode, so that a picture in work does not wait for nodes. `None` if there is no room for them.
+    decoders: Option<Arc<ThreadPool>>,
 }
 
 /// What a layer shows: an octree, the field that the nodes have, and the nodes.
@@ -105,6 +108,7 @@ impl<'a> Loading<'a> {
             is_waiting: false,
             there: 0,
             failures: HashMap::new(),
+            decoders: ThreadPoolBuilder::new().num_threads(current_num_threads()).build().ok().map(Arc::new),
         }
     }
 
@@ -216,7 +220,8 @@ impl<'a> Loading<'a> {
         let wanted = self.wanted(open);
         let mut damaged = [0, 0];
         let mut first_damage = None;
-        let loaded = load_nodes(&own, nodes, &wanted, follower, |NodePoints { node, cloud, damage }| {
+        let decoders = self.decoders.clone();
+        let take = |NodePoints { node, cloud, damage }: NodePoints| {
             let points = picture.points(NodeKey { tree: index as u32, ..node });
             if let Some(damage) = damage {
                 damaged = [damaged[0] + 1, damaged[1] + points];
@@ -231,7 +236,11 @@ impl<'a> Loading<'a> {
                 self.show_in_time(picture, choice);
             }
             Ok(())
-        });
+        };
+        let loaded = match &decoders {
+            Some(decoders) => decoders.install(|| load_nodes(&own, nodes, &wanted, follower, take)),
+            None => load_nodes(&own, nodes, &wanted, follower, take),
+        };
         let name = open.tree.name().file_name().unwrap_or_default().to_string_lossy();
         if let Some(damage) = first_damage {
             let [nodes, points] = damaged;

@@ -84,7 +84,7 @@ fn octrees(ui: &mut egui::Ui, status: &TreeStatus, points: usize) {
     ui.label(text).on_hover_text(hint);
     if is_limited {
         let hint = format!("{apart}; a larger --points-budget or --memory shows finer ones");
-        ui.weak(format!("{spacing_px:.1} px")).on_hover_text(hint);
+        ui.weak(format!("{spacing_px:.1} px apart")).on_hover_text(hint);
     }
 }
 
