@@ -159,7 +159,7 @@ fn other_programs_read_all_of_it_and_parts() {
 fn check_structure(path: &Path) -> Vec<usize> {
     let tree = open_tree(path, &()).unwrap().expect("it is COPC");
     let info = tree.info();
-    assert_eq!(info.notes, Vec::<String>::new());
+    assert_eq!(info.notes, Vec::<String>::new(), "nothing is odd");
     let keys = keys(&*tree);
     let mut levels = vec![0; 1 + keys.iter().map(|key| key.level as usize).max().unwrap()];
     for &key in &keys {

@@ -54,7 +54,7 @@ pub enum TreeInput<'a> {
 
 /// An open input.
 pub(super) enum Source<'a> {
-    Las(Stream),
+    Las(Box<Stream>),
     Clouds { clouds: Box<dyn Clouds + 'a>, survey: Mutex<Option<Survey>> },
 }
 
@@ -84,7 +84,7 @@ impl<'a> Source<'a> {
     pub(super) fn open(input: TreeInput<'a>) -> Result<Self, Error> {
         match input {
             TreeInput::Las(path) => match Stream::open(&path)? {
-                Some(stream) => Ok(Self::Las(stream)),
+                Some(stream) => Ok(Self::Las(Box::new(stream))),
                 None => Err(Error::malformed(&path, "byte 0", "a LAS file begins with 'LASF'; this one does not")),
             },
             TreeInput::Clouds(clouds) => Ok(Self::Clouds { clouds, survey: Mutex::default() }),
