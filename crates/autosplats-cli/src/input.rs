@@ -2,6 +2,7 @@
 
 mod distant;
 mod pose;
+mod streamed;
 mod trees;
 
 use std::fs::metadata;
@@ -79,13 +80,23 @@ pub(crate) struct Playing {
 impl Inputs {
     /// Parses the command line's names without reading a point. Checks scene names, file existence and poses.
     pub(crate) fn new(names: &[String], args: &InputArgs) -> Result<Self, Failure> {
+        let inputs = Self::parse(names, args)?;
+        inputs.check_memory()?;
+        Ok(inputs)
+    }
+
+    /// Fails if the points of generated scenes do not fit into memory.
+    pub(crate) fn check_memory(&self) -> Result<(), Failure> {
+        let generated = self.list.iter().map(|input| input.source.least_bytes()).sum();
+        Ok(check_memory("the points of generated scenes", generated)?)
+    }
+
+    fn parse(names: &[String], args: &InputArgs) -> Result<Self, Failure> {
         let InputArgs { poses, reading, playing } = args;
         let mut list = names.iter().map(|name| existing(name)).collect::<Result<Vec<_>, _>>()?;
         if list.iter().filter(|input| matches!(input.source, Source::StandardInput)).count() > 1 {
             return Err(Failure::usage("-: standard input can be read only once; name it once"));
         }
-        let generated = list.iter().map(|input| input.source.least_bytes()).sum();
-        check_memory("the points of generated scenes", generated)?;
         if reading.columns.is_some() && list.iter().all(|input| matches!(input.source, Source::Scene(..))) {
             return Err(Failure::usage("--columns: no input is a file; generated scenes have no columns"));
         }
@@ -106,10 +117,17 @@ impl Inputs {
         Ok(Self { list, poses: files })
     }
 
-    /// Parses the inputs and, as the last name, the output.
-    pub(crate) fn with_output(paths: &[String], args: &InputArgs) -> Result<(Self, PathBuf), Failure> {
-        match paths {
-            [inputs @ .., output] if !inputs.is_empty() => Ok((Self::new(inputs, args)?.exactly(), output.into())),
+    /// Parses the inputs and the output: `output`, or else the last name. Does not check the memory of scenes.
+    pub(crate) fn with_output(
+        paths: &[String],
+        output: Option<&Path>,
+        args: &InputArgs,
+    ) -> Result<(Self, PathBuf), Failure> {
+        match (paths, output) {
+            (inputs, Some(output)) => Ok((Self::parse(inputs, args)?.exactly(), output.into())),
+            ([inputs @ .., output], None) if !inputs.is_empty() => {
+                Ok((Self::parse(inputs, args)?.exactly(), output.into()))
+            }
             _ => Err(Failure::usage(format!("{}: the name of the file to write is missing", paths.join(" ")))),
         }
     }

@@ -20,7 +20,8 @@ const BYTES_PER_POINT: u64 = 40;
 /// Reads the inputs, estimates, and writes the file.
 pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> {
     let NormalsArgs { paths, input, force, k, orient, sensor, part, run: _ } = args;
-    let (inputs, output) = Inputs::with_output(paths, input)?;
+    let (inputs, output) = Inputs::with_output(paths, None, input)?;
+    inputs.check_memory()?;
     if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pts")) {
         return Err(Failure::usage(format!(
             "{}: PTS cannot hold normals; write .xyz, .ply or another format",

@@ -126,7 +126,7 @@ impl Seek for Stoppable<'_> {
     }
 }
 
-fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
+pub(crate) fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
     let error = error.to_string();
     // The caller does not know the temporary file's name.
     let reason = error.split(" at path ").next().unwrap_or(&error);

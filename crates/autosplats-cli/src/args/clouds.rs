@@ -1,5 +1,7 @@
 //! Arguments of the commands that write or describe clouds: `convert`, `normals` and `info`.
 
+use std::path::PathBuf;
+
 use autosplats::NormalSettings;
 use autosplats_cloud::glam::DVec3;
 use autosplats_formats::written_formats;
@@ -19,7 +21,11 @@ Examples:
   autosplats convert https://example.org/survey.copc.laz part.laz --bounds 512030,5403600,290,512080,5403640,320
   autosplats convert survey.copc.laz overview.laz --spacing 0.5
   autosplats convert scene:herd:10M herd.ply
-  autosplats convert bun000.ply bun045.ply all.ply --pose bun045.ply=bun045.txt";
+  autosplats convert bun000.ply bun045.ply all.ply --pose bun045.ply=bun045.txt
+  autosplats convert tiles/*.laz -o city.copc.laz --memory 4G --temp /scratch
+
+A name that ends in .copc.laz makes an octree, of any number of points: memory is bounded, and about as much disk as
+the uncompressed points take is used for a while.";
 
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_EXAMPLES, override_usage = "autosplats convert [OPTIONS] <INPUT>... <OUT>")]
@@ -29,9 +35,18 @@ pub(crate) struct ConvertArgs {
     pub(crate) paths: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
+    /// File to write, instead of the last name; then all names are inputs
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: Option<PathBuf>,
     /// Replace an existing file
     #[arg(long, help_heading = "Running")]
     pub(crate) force: bool,
+    /// Memory for making an octree (.copc.laz), such as 500M [default: a quarter of what is free, at most 2G]
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true, help_heading = "Running")]
+    pub(crate) memory: Option<u64>,
+    /// Folder for the temporary file of making an octree [default: that of the output]
+    #[arg(long, value_name = "FOLDER", help_heading = "Running")]
+    pub(crate) temp: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) part: PartArgs,
     #[command(flatten)]

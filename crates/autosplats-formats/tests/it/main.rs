@@ -6,6 +6,7 @@ mod choosing;
 mod color_scales;
 mod common;
 mod copc;
+mod copc_writing;
 mod depth_images;
 mod e57;
 mod e57_faults;

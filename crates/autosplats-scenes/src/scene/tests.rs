@@ -206,7 +206,7 @@ fn points_are_sampled_evenly() {
     let tree = Octree::new(body, Fold::None, DVec3::splat(-3.0), 6.0, 7);
     let count = 300_000;
     let (mut positions, mut colors) = (vec![[0.0; 3]; count], vec![[0; 3]; count]);
-    assert!(sample::sample_surface(&tree, &[1.0], &mut positions, &mut colors, &()), "the body is strewn");
+    assert!(sample::Zones::new(&tree, &[1.0]).sample(0, &mut positions, &mut colors, &()), "the body is strewn");
 
     let ball = 4.0 * std::f64::consts::PI * radius * radius;
     let faces = [half.y * half.z, half.x * half.z, half.x * half.y].map(|quarter| 4.0 * quarter);

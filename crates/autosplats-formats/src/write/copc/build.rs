@@ -7,7 +7,7 @@
 //! more than [`LEAF`] points has children. From the leaves up, the [`Sampler`] chooses which points move to the parent;
 //! a point ends in the coarsest node that chose it. Points that the part's own root chose may move on above it.
 
-use std::ops::Range;
+use std::{cell::Cell, ops::Range};
 
 use autosplats_cloud::{Error, Progress};
 use rayon::prelude::*;
@@ -181,6 +181,8 @@ struct Candidates {
     /// Index of the first candidate of each child, and what it is.
     children: Vec<(usize, Rising)>,
     count: usize,
+    /// The child that was asked for last: most candidates follow each other.
+    last: Cell<usize>,
 }
 
 impl Candidates {
@@ -195,7 +197,7 @@ impl Candidates {
             first
         };
         let children = children.into_iter().map(|child| (first(&child), child)).collect();
-        Self { children, count }
+        Self { children, count, last: Cell::new(0) }
     }
 
     fn count(&self) -> usize {
@@ -203,7 +205,12 @@ impl Candidates {
     }
 
     fn find(&self, index: usize) -> (usize, &Rising) {
-        let child = self.children.partition_point(|(first, _)| *first <= index) - 1;
+        let mut child = self.last.get();
+        let after = self.children.get(child + 1).map_or(self.count, |(first, _)| *first);
+        if !(self.children[child].0..after).contains(&index) {
+            child = self.children.partition_point(|(first, _)| *first <= index) - 1;
+            self.last.set(child);
+        }
         let (first, rising) = &self.children[child];
         (index - first, rising)
     }

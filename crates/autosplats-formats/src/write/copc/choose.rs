@@ -1,6 +1,9 @@
 //! Which records are kept.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{
+    Mutex,
+    atomic::{AtomicU64, Ordering},
+};
 
 use autosplats_cloud::{FieldValues, PointCloud, PointFilter};
 use glam::DVec3;
@@ -8,6 +11,7 @@ use glam::DVec3;
 use super::{
     frame::{Lattice, steps_of},
     schema::Schema,
+    spill::lock,
 };
 use crate::las::{self, Place};
 
@@ -22,20 +26,65 @@ pub(super) struct Chosen {
     /// Number of records inside the box, and of those that the filter left out.
     inside: AtomicU64,
     left_out: AtomicU64,
+    /// Points at (0, 0, 0), if they are left out: their number, and one of them.
+    nowhere: Option<Mutex<(u64, Vec<u8>)>>,
 }
 
 impl Chosen {
-    pub(super) fn new(bounds: Option<[DVec3; 2]>, keep: Option<PointFilter>, schema: &Schema) -> Self {
+    pub(super) fn new(
+        bounds: Option<[DVec3; 2]>,
+        keep: Option<PointFilter>,
+        drops_nowhere: bool,
+        schema: &Schema,
+    ) -> Self {
         let keep = keep.filter(|filter| !filter.is_all());
         let mut places = las::places(schema.format);
         places.retain(|(name, _)| keep.as_ref().is_some_and(|filter| filter.needs(name)));
         let Schema { lattice, record_len, .. } = *schema;
         let (inside, left_out) = (AtomicU64::new(0), AtomicU64::new(0));
-        Self { bounds, keep, lattice, record_len, places, inside, left_out }
+        let nowhere = drops_nowhere.then(Mutex::default);
+        Self { bounds, keep, lattice, record_len, places, inside, left_out, nowhere }
     }
 
     /// Removes the records that are left out.
     pub(super) fn retain(&self, records: &mut Vec<u8>) {
+        if let Some(nowhere) = &self.nowhere {
+            let (lattice, len) = (self.lattice, self.record_len);
+            let half = lattice.scale / 2.0;
+            let is_nowhere = |record: &[u8]| lattice.world(steps_of(record).map(i64::from)).abs().cmplt(half).all();
+            if records.chunks_exact(len).any(is_nowhere) {
+                let mut nowhere = lock(nowhere);
+                let (count, one) = &mut *nowhere;
+                for record in records.chunks_exact(len).filter(|record| is_nowhere(record)) {
+                    *count += 1;
+                    one.clear();
+                    one.extend_from_slice(record);
+                }
+                retain(records, len, |_, record| !is_nowhere(record));
+            }
+        }
+        self.retain_chosen(records);
+    }
+
+    /// Number of points at (0, 0, 0) that were left out.
+    pub(super) fn nowhere(&self) -> u64 {
+        self.nowhere.as_ref().map_or(0, |nowhere| lock(nowhere).0)
+    }
+
+    /// Takes the only point at (0, 0, 0) back, which may be real.
+    pub(super) fn only_nowhere(&self) -> Option<Vec<u8>> {
+        let mut nowhere = lock(self.nowhere.as_ref()?);
+        let (count, one) = &mut *nowhere;
+        (*count == 1).then(|| {
+            *count = 0;
+            let mut one = std::mem::take(one);
+            self.retain_chosen(&mut one);
+            one
+        })
+    }
+
+    /// Removes the records that are outside of the box or that the filter leaves out.
+    pub(super) fn retain_chosen(&self, records: &mut Vec<u8>) {
         if let Some([min, max]) = self.bounds {
             let (lattice, len) = (self.lattice, self.record_len);
             let inside = |record: &[u8]| {
@@ -69,6 +118,7 @@ impl Chosen {
     }
 
     pub(super) fn forget(&self) {
+        self.nowhere.iter().for_each(|nowhere| lock(nowhere).0 = 0);
         [&self.left_out, &self.inside].iter().for_each(|count| count.store(0, Ordering::Relaxed));
     }
 }

@@ -81,7 +81,7 @@ impl Frame {
 
     /// Width of the cube in world units.
     pub(super) fn side(&self) -> f64 {
-        self.unit * (self.bits as f64).exp2()
+        self.unit * f64::from(self.bits).exp2()
     }
 
     /// Middle of the cube in world coordinates.

@@ -32,7 +32,7 @@ pub(super) fn pages(entries: &mut [Entry], at: u64) -> (Vec<u8>, RootPage) {
 }
 
 /// The entries of a level below a node.
-fn below<'a>(entries: &'a [Entry], place: Place, level: u32) -> &'a [Entry] {
+fn below(entries: &[Entry], place: Place, level: u32) -> &[Entry] {
     let shift = 3 * (level - place.level);
     let order = |entry: &Entry| (entry.place.level, entry.place.code >> shift);
     let start = entries.partition_point(|entry| entry.place.level < level || order(entry) < (level, place.code));

@@ -88,6 +88,8 @@ pub struct TreeOptions {
     pub bounds: Option<[DVec3; 2]>,
     /// Which points of LAS files to keep. Of other inputs, whoever reads them chooses.
     pub keep: Option<PointFilter>,
+    /// Keep points of LAS files at (0, 0, 0), which scanners write for missing returns.
+    pub keep_no_returns: bool,
 }
 
 /// A tree that was made.
@@ -227,7 +229,8 @@ impl Making<'_> {
     fn check_part(&self, points: u64) -> Result<(), Error> {
         let bytes = points * self.point_bytes();
         if bytes > self.memory() {
-            let what = format!("{points} points that lie together; allow {} bytes at least", bytes + RESERVE);
+            let least = (bytes + RESERVE).div_ceil(1 << 20);
+            let what = format!("{points} points at a time, for which at least {least} MiB must be allowed,");
             return Err(Error::OutOfMemory { what, bytes: bytes as usize });
         }
         Ok(())
@@ -410,7 +413,6 @@ impl Making<'_> {
             lock(&bounds).join(&own);
             Ok(())
         })?;
-        sources.iter().for_each(Prepared::forget);
         let bounds = *lock(&bounds);
         Ok(bounds)
     }

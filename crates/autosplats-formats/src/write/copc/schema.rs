@@ -157,9 +157,13 @@ fn lattice(inputs: &[Holds], progress: &dyn Progress) -> Result<Lattice, Error> 
         while size > 2.0 * MAX_STEPS * scale[axis] {
             scale[axis] *= 10.0;
         }
-        if scale[axis] != wished && inputs.iter().any(|input| input.lattice.is_some()) {
-            let [wished, scale] = [wished, scale[axis]].map(shown_number);
-            progress.note(&format!("32 bits do not reach over all points in steps of {wished}; steps of {scale} do"));
+        let loses = |input: &&Holds| input.lattice.is_some_and(|own| own.scale[axis].abs() < 0.999 * scale[axis]);
+        if let Some(input) = inputs.iter().find(loses) {
+            let what = format!(
+                "32 bits do not reach from it to the other inputs in its steps of {}; convert them one by one",
+                shown_number(wished)
+            );
+            return Err(Error::unsupported(&input.name, what));
         }
         let reaches = |offset: f64| [low, high].iter().all(|end| (end[axis] - offset).abs() <= MAX_STEPS * scale[axis]);
         if !(offset[axis].is_finite() && reaches(offset[axis])) {
@@ -189,7 +193,9 @@ fn scale_of_floats(size: DVec3, points: u64, degrees: bool) -> DVec3 {
         // Points on a line have no area.
         let spacing = (area / points.max(1) as f64).sqrt().max(size.max_element() / points.max(1) as f64);
         let spacing = if spacing > 0.0 { spacing } else { 1.0 };
-        10_f64.powf((spacing / 1000.0).log10().floor()).clamp(1e-12, 1e-3)
+        // A quotient is rounded to the digits that a person would write.
+        let digits = -(spacing / 1000.0).log10().floor().clamp(-12.0, -3.0);
+        1.0 / 10_f64.powi(digits as i32)
     };
     if !degrees {
         return DVec3::splat(of(size));

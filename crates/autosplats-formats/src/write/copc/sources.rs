@@ -54,7 +54,7 @@ pub enum TreeInput<'a> {
 
 /// An open input.
 pub(super) enum Source<'a> {
-    Las(Stream),
+    Las(Box<Stream>),
     Clouds { clouds: Box<dyn Clouds + 'a>, survey: Mutex<Option<Survey>> },
 }
 
@@ -84,7 +84,7 @@ impl<'a> Source<'a> {
     pub(super) fn open(input: TreeInput<'a>) -> Result<Self, Error> {
         match input {
             TreeInput::Las(path) => match Stream::open(&path)? {
-                Some(stream) => Ok(Self::Las(stream)),
+                Some(stream) => Ok(Self::Las(Box::new(stream))),
                 None => Err(Error::malformed(&path, "byte 0", "a LAS file begins with 'LASF'; this one does not")),
             },
             TreeInput::Clouds(clouds) => Ok(Self::Clouds { clouds, survey: Mutex::default() }),
@@ -135,7 +135,8 @@ impl<'a> Source<'a> {
         let extras = Extras::of(record_len - las::RECORD_LEN[format], &descriptors);
         let recoder = Recoder::new(name, format, record_len, &lattice, &extras, schema);
         let keep = options.keep.clone().filter(|_| matches!(self, Self::Las(_)));
-        let chosen = Chosen::new(options.bounds, keep, schema);
+        let drops_nowhere = matches!(self, Self::Las(_)) && !options.keep_no_returns;
+        let chosen = Chosen::new(options.bounds, keep, drops_nowhere, schema);
         Ok(Prepared { source: self, shape, lattice, recoder, lost: Mutex::default(), chosen })
     }
 }
@@ -218,6 +219,7 @@ fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Opt
     holds.points = survey.points as u64;
     (holds.colors, holds.infrared) = (survey.colored, shape.format == 8);
     holds.bounds = survey.bounds;
+    holds.lattice = survey.steps.map(|scale| Lattice { scale, offset: glam::DVec3::ZERO });
     holds.extras = Extras::of(shape.record_len - las::RECORD_LEN[shape.format], &shape.descriptors);
     (holds.crs, holds.standard_time) = (crs, survey.standard_time());
     Ok((holds, Some(survey)))
@@ -240,8 +242,20 @@ impl Prepared<'_> {
         progress: &dyn Progress,
         take: &(dyn Fn(&[u8]) -> Result<(), Error> + Sync),
     ) -> Result<(), Error> {
+        // Points may be read a second time.
+        self.chosen.forget();
         match (&self.source, &self.shape) {
-            (Source::Las(stream), _) => self.read_records(stream, progress, take),
+            (Source::Las(stream), _) => {
+                self.records(stream, progress, &|records| self.chosen.retain(records), take)?;
+                let nowhere = self.chosen.nowhere();
+                if nowhere > 1 && nowhere == stream.facts.points - lock(&self.lost).0 {
+                    // All points are there, so something was measured.
+                    let chosen = |records: &mut Vec<u8>| self.chosen.retain_chosen(records);
+                    self.chosen.forget();
+                    return self.records(stream, progress, &chosen, take);
+                }
+                self.chosen.only_nowhere().map_or(Ok(()), |one| take(&one))
+            }
             (Source::Clouds { clouds, .. }, Some(shape)) => {
                 clouds.read(&Quiet(progress), &|cloud| self.encode(cloud, shape, progress, take))
             }
@@ -249,12 +263,15 @@ impl Prepared<'_> {
         }
     }
 
-    fn read_records(
+    /// Passes on the records of a file that `retain` leaves.
+    fn records(
         &self,
         stream: &Stream,
         progress: &dyn Progress,
+        retain: &(dyn Fn(&mut Vec<u8>) + Sync),
         take: &(dyn Fn(&[u8]) -> Result<(), Error> + Sync),
     ) -> Result<(), Error> {
+        *lock(&self.lost) = (0, String::new());
         let spaces: Mutex<Vec<(Space, Vec<u8>)>> = Mutex::default();
         (0..stream.runs()).into_par_iter().try_for_each(|run| {
             if progress.cancelled() {
@@ -264,7 +281,7 @@ impl Prepared<'_> {
             let lost = stream.read(run, &mut space, &mut |piece| {
                 records.clear();
                 self.recoder.recode(piece, &mut records)?;
-                self.chosen.retain(&mut records);
+                retain(&mut records);
                 take(&records)
             })?;
             lock(&spaces).push((space, records));
@@ -302,12 +319,6 @@ impl Prepared<'_> {
         })
     }
 
-    /// Forgets which points were lost or left out, since all are read again.
-    pub(super) fn forget(&self) {
-        *lock(&self.lost) = (0, String::new());
-        self.chosen.forget();
-    }
-
     /// Tells which points could not be read, and which were left out.
     pub(super) fn tell_lost(&self, several: bool, progress: &dyn Progress) -> Result<(), Error> {
         let Source::Las(stream) = &self.source else { return Ok(()) };
@@ -318,6 +329,11 @@ impl Prepared<'_> {
         }
         if lost > 0 {
             let note = format!("compressed data are damaged: {lost} of {all} points are lost; copy the file again");
+            progress.note(&about(&stream.path, several, &note));
+        }
+        let nowhere = self.chosen.nowhere();
+        if nowhere > 0 {
+            let note = format!("dropped {nowhere} of {all} points at (0, 0, 0), where nothing was measured");
             progress.note(&about(&stream.path, several, &note));
         }
         if let Some(note) = self.chosen.note() {

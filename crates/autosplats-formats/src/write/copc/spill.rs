@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicUsize, Ordering},
+        atomic::{AtomicU64, AtomicUsize, Ordering},
     },
 };
 
@@ -32,6 +32,9 @@ pub(super) struct Spill {
     budget: usize,
     gathered: AtomicUsize,
     slots: Mutex<Slots>,
+    /// Bytes of records on the disk, and the most there were.
+    stored: AtomicU64,
+    most: AtomicU64,
 }
 
 /// Which slots are free.
@@ -58,7 +61,8 @@ impl Spill {
         let slot = (wished / record_len).max(1) * record_len;
         let file = temporary_unnamed(folder).map_err(|source| Error::Io { path: folder.into(), source })?;
         let (gathered, slots) = (AtomicUsize::new(0), Mutex::default());
-        Ok(Self { folder: folder.into(), file, record_len, slot, budget, gathered, slots })
+        let (stored, most) = (AtomicU64::new(0), AtomicU64::new(0));
+        Ok(Self { folder: folder.into(), file, record_len, slot, budget, gathered, slots, stored, most })
     }
 
     fn io(&self, source: std::io::Error) -> Error {
@@ -114,7 +118,10 @@ impl Spill {
         };
         let at = u64::from(slot) * self.slot as u64;
         write_all_at(&self.file, &cell.gathered, at).map_err(|source| self.io(source))?;
-        cell.slots.push((slot, cell.gathered.len() as u32));
+        let len = cell.gathered.len() as u64;
+        let stored = self.stored.fetch_add(len, Ordering::Relaxed) + len;
+        self.most.fetch_max(stored, Ordering::Relaxed);
+        cell.slots.push((slot, len as u32));
         cell.gathered.clear();
         Ok(())
     }
@@ -127,6 +134,7 @@ impl Spill {
             let bytes = &mut bytes[..len as usize];
             read_exact_at(&self.file, bytes, u64::from(slot) * self.slot as u64).map_err(|source| self.io(source))?;
             lock(&self.slots).free.push(slot);
+            self.stored.fetch_sub(u64::from(len), Ordering::Relaxed);
             each(bytes)?;
         }
         if gathered.capacity() > 0 {
@@ -135,9 +143,9 @@ impl Spill {
         if gathered.is_empty() { Ok(()) } else { each(&gathered) }
     }
 
-    /// Most bytes that the file has had.
+    /// Most bytes of records that were on the disk at once. Slots that are not full leave holes, which take no room.
     pub(super) fn bytes(&self) -> u64 {
-        u64::from(lock(&self.slots).used) * self.slot as u64
+        self.most.load(Ordering::Relaxed)
     }
 }
 

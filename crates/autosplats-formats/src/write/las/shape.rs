@@ -16,6 +16,9 @@ const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 const MAX_RECORD: usize = 65_535;
 const MAX_NAME: usize = 32;
 
+/// Distance of coordinates from multiples of their steps, in steps, that is due to rounding.
+const MAX_MISS: f64 = 0.01;
+
 /// What points hold, which may come in several clouds.
 #[derive(Clone, Debug)]
 pub(in crate::write) struct Survey {
@@ -24,6 +27,8 @@ pub(in crate::write) struct Survey {
     dropped: usize,
     /// Corners of the box around the points.
     pub(in crate::write) bounds: [DVec3; 2],
+    /// Steps of which all coordinates are multiples, if the clouds state them.
+    pub(in crate::write) steps: Option<DVec3>,
     pub(super) fields: Vec<Surveyed>,
     pub(in crate::write) colored: bool,
     wide: bool,
@@ -52,6 +57,12 @@ impl Survey {
         };
         let join = |(n, [a, b]): (usize, [DVec3; 2]), (m, [c, d]): (usize, [DVec3; 2])| (n + m, [a.min(c), b.max(d)]);
         let (points, bounds) = (0..cloud.len()).into_par_iter().map(one).reduce(|| none, join);
+        let positive = |steps: &DVec3| steps.is_finite() && steps.cmpgt(DVec3::ZERO).all();
+        let is_multiple = |steps: &DVec3| {
+            let miss = |place: DVec3| (place / *steps - (place / *steps).round()).abs().max_element();
+            (0..cloud.len()).into_par_iter().map(|i| cloud.world_position(i)).all(|place| !(miss(place) > MAX_MISS))
+        };
+        let steps = cloud.resolution().filter(positive).filter(is_multiple);
         let wide = wide_colors(cloud).is_some();
         let is_color = |name: &str| wide && colors::CHANNELS.contains(&name);
         let fields = cloud.fields().iter().filter(|field| !is_color(&field.name));
@@ -68,6 +79,7 @@ impl Survey {
             points,
             dropped: cloud.len() - points,
             bounds,
+            steps,
             colored: wide || cloud.colors().is_some(),
             wide,
             sensors: !cloud.scans().is_empty(),
@@ -86,6 +98,7 @@ impl Survey {
         }
         self.points += other.points;
         self.dropped += other.dropped;
+        self.steps = self.steps.filter(|_| self.steps == other.steps);
         self.bounds = [self.bounds[0].min(other.bounds[0]), self.bounds[1].max(other.bounds[1])];
         for (own, other) in self.fields.iter_mut().zip(other.fields) {
             own.range = own.range.and(other.range);

@@ -1,5 +1,7 @@
 //! `autosplats convert`: writes one or several inputs to a file of another format.
 
+mod tree;
+
 use autosplats_cloud::{PointCloud, Unit};
 
 use crate::args::{ConvertArgs, ThinningArgs};
@@ -11,9 +13,18 @@ use crate::progress::Bar;
 
 /// Reads the inputs and writes the file.
 pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
-    let ConvertArgs { paths, input, force, part, thinning, run: _ } = args;
-    let (inputs, output) = Inputs::with_output(paths, input)?;
+    let ConvertArgs { paths, input, force, part, thinning, .. } = args;
+    let (inputs, output) = Inputs::with_output(paths, args.output.as_deref(), input)?;
     check_cloud_target(&output, *force, &inputs.files([]), console)?;
+    if tree::is_tree(&output) {
+        return tree::run(args, &inputs, &output, console);
+    }
+    if args.memory.is_some() || args.temp.is_some() {
+        return Err(Failure::usage(
+            "--memory, --temp: only an octree, a name that ends in .copc.laz, is made in parts",
+        ));
+    }
+    inputs.check_memory()?;
     let (mut cloud, read) = match input.playing.sample {
         Some(count) => {
             let mut cloud = inputs.sample(count, thinning.seed, console)?;

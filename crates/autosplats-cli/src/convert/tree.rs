@@ -1,0 +1,83 @@
+//! Writing one octree of all inputs, in bounded memory.
+
+use std::fs::metadata;
+use std::path::Path;
+
+use autosplats_cloud::{Error, available_memory};
+use autosplats_formats::{TreeOptions, write_tree};
+
+use crate::args::ConvertArgs;
+use crate::console::Console;
+use crate::exit::{Exit, Failure};
+use crate::input::Inputs;
+use crate::output::{cannot_write, folder_of};
+use crate::progress::Bar;
+
+/// Bounds of the default memory, in bytes.
+const USUAL: [u64; 2] = [256 << 20, 2 << 30];
+
+/// What the names of octrees end in.
+const ENDING: &str = ".copc.laz";
+
+/// Whether the name is that of an octree.
+pub(super) fn is_tree(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().to_ascii_lowercase().ends_with(ENDING))
+}
+
+/// Fails for options that need all points in memory at once.
+fn check(args: &ConvertArgs) -> Result<(), Failure> {
+    let ConvertArgs { input, part, thinning, .. } = args;
+    let refused = [
+        ("--spacing", part.spacing.is_some()),
+        ("--every", thinning.every.is_some()),
+        ("--voxel", thinning.voxel.is_some()),
+        ("--noise", thinning.noise.is_some()),
+        ("--sample", input.playing.sample.is_some()),
+    ];
+    match refused.into_iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) => Err(Failure::usage(format!(
+            "{option}: points go straight into an octree; convert to a plain .laz with {option} first, and that to {ENDING}"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Reads the inputs and writes the tree.
+pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: &Path, console: &Console) -> Result<(), Failure> {
+    check(args)?;
+    let usual = || (available_memory().unwrap_or(USUAL[1]) / 4).clamp(USUAL[0], USUAL[1]);
+    let options = TreeOptions {
+        memory: args.memory.unwrap_or_else(usual),
+        temp: args.temp.clone(),
+        bounds: args.part.bounds,
+        keep: args.input.reading.keep.clone(),
+        keep_no_returns: args.input.reading.keep_no_returns,
+    };
+    let bar = Bar::on_file("building", output, console);
+    let _writing = console.interrupt().writing();
+    let summary =
+        write_tree(inputs.streamed(), output, &options, &bar).map_err(|error| failure(error, output, &options))?;
+    drop(bar);
+    let bytes = metadata(output).map(|metadata| metadata.len()).map_err(|error| cannot_write(output, &error))?;
+    console.tell(format_args!(
+        "{}: {} points in {} nodes, {bytes} bytes",
+        output.display(),
+        summary.points,
+        summary.nodes
+    ));
+    Ok(())
+}
+
+/// The failure of an error: of the output, if that or the folder of temporary files is to blame.
+fn failure(error: Error, output: &Path, options: &TreeOptions) -> Failure {
+    let temp = options.temp.as_deref().unwrap_or(folder_of(output));
+    match &error {
+        Error::Io { path, source } if path == output => cannot_write(output, source),
+        Error::Io { path, source } if path == temp => {
+            Failure::new(Exit::Output, format!("{}: {source}", temp.display()))
+        }
+        Error::OutOfMemory { .. } => Failure::new(Exit::Memory, error),
+        Error::Cancelled => Failure::interrupted(),
+        _ => Failure::from(error),
+    }
+}
