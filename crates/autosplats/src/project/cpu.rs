@@ -33,7 +33,8 @@ pub(super) const OCCUPANCY_BLOCK_PX: usize = 16;
 /// Projects clouds. All buffers but the two lists `active` and `passive` are reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Projector {
-    /// Per pixel or half pixel, `depth bits << 32 | ordinal of the point`. The bits of positive floats order like the floats.
+    /// Per pixel or half pixel, `depth bits << 32 | ordinal of the point`. The bits of positive floats order like the
+    /// floats.
     keys: Vec<AtomicU64>,
     near: NearCells,
     screen: ScreenPoints,
@@ -173,8 +174,8 @@ const NOT_FINITE: u32 = u32::MAX;
 const BEHIND: u32 = u32::MAX - 1;
 const OUTSIDE: u32 = u32::MAX - 2;
 
-/// Projects up to [`TASK_POINTS`] points, of which the first has `ordinal`, and counts them in the cells around the eye if `NEAR`. Compiled for the
-/// baseline processor: wider vectors make projection slower.
+/// Projects up to [`TASK_POINTS`] points, of which the first has `ordinal`, and counts them in the cells around the eye
+/// if `NEAR`. Compiled for the baseline processor: wider vectors make projection slower.
 fn project_chunk<const NEAR: bool>(
     positions: &[[f32; 3]],
     ordinal: u32,

@@ -1,6 +1,6 @@
 // Like `project`, for devices without 64-bit atomics. The first turn finds the nearest depth of each slot, the second
-// the lowest ordinal among the points at that depth. Both turns share one program, because two programs need not compute
-// the same bits: a depth that differed between them would leave a hole.
+// the lowest ordinal among the points at that depth. Both turns share one program, because two programs need not
+// compute the same bits: a depth that differed between them would leave a hole.
 //
 // Reads: a chunk of the cloud, turn. Writes: keys, counters, sixteenths, near.
 

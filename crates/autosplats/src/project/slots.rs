@@ -26,8 +26,9 @@ pub(crate) struct SlotTable<'a> {
 /// difference.
 ///
 /// - Points are sampled by *names*: they count up in the order of runs, as the indices of a cloud do.
-/// - Of points in the same place the one with the lowest *ordinal* is seen. An ordinal is an index as if runs lay in slots one
-///   after the other. It orders points as names do, and leads back to the index. The ordinals of a cloud are the indices.
+/// - Of points in the same place the one with the lowest *ordinal* is seen. An ordinal is an index as if runs lay in
+///   slots one after the other. It orders points as names do, and leads back to the index. The ordinals of a cloud are
+///   the indices.
 #[derive(Clone, Debug)]
 pub(crate) struct PointNames {
     shift: u32,

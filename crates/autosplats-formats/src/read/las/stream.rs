@@ -3,7 +3,8 @@
 //! # How it works
 //!
 //! Opening finds the runs: chunks of a compressed file, pieces of another. Each run is read by itself, from any thread.
-//! Runs are read, not mapped, so that memory limits hold; only a chunk of many megabytes, as old writers make, is mapped.
+//! Runs are read, not mapped, so that memory limits hold; only a chunk of many megabytes, as old writers make, is
+//! mapped.
 
 use std::{
     fs::File,
@@ -33,7 +34,8 @@ use crate::{
 /// Records of a run of an uncompressed file.
 const PIECE: usize = 1 << 16;
 
-/// Longest chunk of which all records are decompressed before any is passed on, so that a damaged one is left out whole.
+/// Longest chunk of which all records are decompressed before any is passed on, so that a damaged one is left out
+/// whole.
 const WHOLE: usize = 1 << 18;
 
 /// Largest chunk that is read; a larger one is mapped.

@@ -13,7 +13,7 @@ use autosplats_cloud::{Error, Progress};
 use rayon::prelude::*;
 
 use super::{
-    compress::{Compressor, Packed},
+    compress::{Compressor, Node},
     frame::{CELL_BITS, Frame, morton, steps_of, unmorton},
     key::Place,
     sample::{Candidate, Choice, Sampler},
@@ -29,12 +29,6 @@ const MAX_BITS: u32 = 21;
 /// Home of a point that moves above the part.
 const ABOVE: u8 = u8::MAX;
 
-/// A node with its compressed points.
-pub(super) struct Node {
-    pub(super) place: Place,
-    pub(super) packed: Packed,
-}
-
 /// The points of a node that may move to its parent, with their records, in Morton order.
 pub(super) struct Top {
     pub(super) place: Place,
@@ -42,7 +36,8 @@ pub(super) struct Top {
     pub(super) records: Vec<u8>,
 }
 
-/// A part of the tree: its finished nodes from coarse to fine, and the node at its root unless that is the whole tree's.
+/// A part of the tree: its finished nodes from coarse to fine, and the node at its root unless that is the whole
+/// tree's.
 pub(super) struct Part {
     pub(super) nodes: Vec<Node>,
     pub(super) top: Option<Top>,

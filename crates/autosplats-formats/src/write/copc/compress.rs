@@ -9,7 +9,7 @@ use laz::{
     record::{LayeredPointRecordCompressor, RecordCompressor as _},
 };
 
-use super::file::time_of;
+use super::key::Place;
 use crate::{
     las,
     write::las::{Totals, failed_packing},
@@ -28,6 +28,12 @@ pub(super) struct Packed {
     pub(super) totals: Totals,
     /// Least and greatest time.
     pub(super) times: [f64; 2],
+}
+
+/// A node with its compressed points.
+pub(super) struct Node {
+    pub(super) place: Place,
+    pub(super) packed: Packed,
 }
 
 impl Compressor {
@@ -56,4 +62,11 @@ impl Compressor {
         compressor.done().map_err(io)?;
         Ok(Packed { bytes: compressor.into_inner().into_inner(), totals, times })
     }
+}
+
+/// The time of a record.
+fn time_of(record: &[u8]) -> f64 {
+    let mut raw = [0; 8];
+    raw.copy_from_slice(&record[las::WIDE_TIME..las::WIDE_TIME + 8]);
+    f64::from_le_bytes(raw)
 }

@@ -2,9 +2,10 @@
 //!
 //! # How it works
 //!
-//! Records are sorted into the cells of a grid as they are read, each batch by the thread that read it. Cells are joined
-//! to the largest cubes of the octree with few enough points: the parts. A cell with too many is sorted again, into a
-//! finer grid. Which parts there are depends on the points alone, and not on the memory: so the file does not either.
+//! Records are sorted into the cells of a grid as they are read, each batch by the thread that read it. Cells are
+//! joined to the largest cubes of the octree with few enough points: the parts. A cell with too many is sorted again,
+//! into a finer grid. Which parts there are depends on the points alone, and not on the memory: so the file does not
+//! either.
 
 use std::sync::{
     Mutex,

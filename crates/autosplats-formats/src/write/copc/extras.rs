@@ -1,8 +1,9 @@
 //! Extra bytes: the values beyond those of the point format, joined over all inputs.
 
+use std::path::Path;
+
 use autosplats_cloud::{Error, Progress, printable};
 
-use super::schema::Holds;
 use crate::las::{self, EXTRA_DESCRIPTOR};
 
 /// Bits of the options that tell whether least and greatest values are stated, and where those are.
@@ -69,28 +70,31 @@ impl Extras {
     }
 
     /// The layout that holds those of all inputs.
-    pub(super) fn join(inputs: &[Holds], progress: &dyn Progress) -> Result<Self, Error> {
-        let first = &inputs[0].extras;
-        if inputs.iter().all(|input| input.extras == *first) {
+    pub(super) fn join<'a>(
+        inputs: impl Iterator<Item = (&'a Path, &'a Self)> + Clone,
+        progress: &dyn Progress,
+    ) -> Result<Self, Error> {
+        let Some((_, first)) = inputs.clone().next() else { return Ok(Self::default()) };
+        if inputs.clone().all(|(_, extras)| extras == first) {
             return Ok(first.clone());
         }
         let plain = first.plain();
-        if inputs.iter().all(|input| input.extras.plain() == plain) {
+        if inputs.clone().all(|(_, extras)| extras.plain() == plain) {
             return Ok(plain);
         }
         let mut all: Vec<Extra> = Vec::new();
-        for input in inputs {
-            for extra in input.extras.plain().0 {
+        for (input, extras) in inputs.clone() {
+            for extra in extras.plain().0 {
                 let Some(name) = extra.name() else {
                     let what = "some of its extra bytes are not described, so they cannot be joined with other files";
-                    return Err(Error::unsupported(&input.name, what));
+                    return Err(Error::unsupported(input, what));
                 };
                 match all.iter().find(|other| other.name() == Some(name)) {
                     Some(other) if *other == extra => {}
                     Some(_) => {
                         let name = printable(&String::from_utf8_lossy(name));
                         let what = format!("its extra value '{name}' is not described as in the other inputs");
-                        return Err(Error::unsupported(&input.name, what));
+                        return Err(Error::unsupported(input, what));
                     }
                     None => all.push(extra),
                 }
@@ -98,7 +102,7 @@ impl Extras {
         }
         // The order of the inputs does not matter.
         all.sort_by(|a, b| a.name().cmp(&b.name()));
-        let lacking = |extra: &&Extra| !inputs.iter().all(|input| input.extras.plain().0.contains(extra));
+        let lacking = |extra: &&Extra| !inputs.clone().all(|(_, extras)| extras.plain().0.contains(extra));
         for extra in all.iter().filter(lacking) {
             let name = printable(&String::from_utf8_lossy(extra.name().unwrap_or_default()));
             progress.note(&format!("not all inputs have the extra value '{name}'; it is 0 in the others"));

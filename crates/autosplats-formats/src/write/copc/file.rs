@@ -14,15 +14,14 @@ use laz::{
 };
 
 use super::{
-    build::Node,
-    compress::{Compressor, Packed},
+    compress::{Compressor, Node, Packed},
     frame::{CELL_BITS, Frame},
-    hierarchy::{self, Entry},
+    hierarchy::{self, Entry, RootPage},
     key::Place,
     schema::Schema,
 };
 use crate::{
-    las::{self, EVLR_HEADER},
+    las::EVLR_HEADER,
     write::las::{Head, Record, Totals, compression_record, crs_records, extra_records},
 };
 
@@ -51,13 +50,6 @@ pub(super) struct TreeFile<'a, 'f> {
     held: BTreeMap<(u32, u64), Packed>,
     /// Least and greatest time of a point.
     times: [f64; 2],
-}
-
-/// Place and size of the hierarchy's first page.
-#[derive(Clone, Copy, Default)]
-pub(super) struct RootPage {
-    pub(super) offset: u64,
-    pub(super) bytes: u64,
 }
 
 impl<'a, 'f> TreeFile<'a, 'f> {
@@ -190,11 +182,4 @@ impl<'a, 'f> TreeFile<'a, 'f> {
         data.resize(INFO_LEN, 0);
         data
     }
-}
-
-/// The time of a record.
-pub(super) fn time_of(record: &[u8]) -> f64 {
-    let mut raw = [0; 8];
-    raw.copy_from_slice(&record[las::WIDE_TIME..las::WIDE_TIME + 8]);
-    f64::from_le_bytes(raw)
 }

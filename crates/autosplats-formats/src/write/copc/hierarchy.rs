@@ -5,7 +5,7 @@
 //! A page takes whole levels of its subtree from the top, as many as fit. The subtrees below have pages of their own. A
 //! file of few nodes has one page.
 
-use super::{file::RootPage, key::Place};
+use super::key::Place;
 
 /// Most entries of a page.
 const MOST: usize = 4096;
@@ -20,6 +20,13 @@ pub(super) struct Entry {
     pub(super) points: i32,
     pub(super) offset: u64,
     pub(super) bytes: i32,
+}
+
+/// Place and size of the hierarchy's first page.
+#[derive(Clone, Copy, Default)]
+pub(super) struct RootPage {
+    pub(super) offset: u64,
+    pub(super) bytes: u64,
 }
 
 /// The pages one after another, the first of which is at byte `at` of the file; and place and size of the root's page.

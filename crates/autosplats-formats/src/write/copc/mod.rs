@@ -4,9 +4,9 @@
 //!
 //! The headers of the inputs tell which [records](schema) hold all that they hold, and how large the [cube](frame) of
 //! the octree is. All points become such records, which are [distributed](distribute) to cells of a grid in one
-//! [temporary file](spill). Cells are joined to parts of a fixed number of points. Each part is [built](build) in memory,
-//! several at a time, and its nodes are written at once. The [nodes above the parts](tops) are joined as their children
-//! come. Tables of [chunks and nodes](file) end the file.
+//! [temporary file](spill). Cells are joined to parts of a fixed number of points. Each part is [built](build) in
+//! memory, several at a time, and its nodes are written at once. The [nodes above the parts](tops) are joined as their
+//! children come. Tables of [chunks and nodes](file) end the file.
 //!
 //! A header may lie about bounds. Points beyond them, or bounds far beyond the points, make the work start again with
 //! the bounds of the points.

@@ -2,11 +2,11 @@
 //!
 //! # How it works
 //!
-//! The candidates of a cell follow each other, since all are in Morton order. The mean is of all points of the tree that
-//! lie in the cell, which candidates carry as counts and sums. A point that is alone in its cell, with fewer than
-//! [`FEW`] others in the 26 cells around, is *lone*: most likely an outlier, which coarse levels shall not show. It stays
-//! where it is, and stays a candidate, since the cells of coarser levels are larger. Neighbouring nodes are not looked
-//! at, so that a node depends on its own points alone.
+//! The candidates of a cell follow each other, since all are in Morton order. The mean is of all points of the tree
+//! that lie in the cell, which candidates carry as counts and sums. A point that is alone in its cell, with fewer than
+//! [`FEW`] others in the 26 cells around, is *lone*: most likely an outlier, which coarse levels shall not show. It
+//! stays where it is, and stays a candidate, since the cells of coarser levels are larger. Neighbouring nodes are not
+//! looked at, so that a node depends on its own points alone.
 //!
 //! All numbers are integers: the result does not depend on the order of summation.
 
@@ -104,7 +104,8 @@ impl Sampler {
     }
 }
 
-/// The candidate nearest to the mean of a cell, the mean, and the number of points. Of equally near ones the first wins.
+/// The candidate nearest to the mean of a cell, the mean, and the number of points. Of equally near ones the first
+/// wins.
 fn nearest(
     range: std::ops::Range<usize>,
     corner: [u32; 3],

@@ -63,7 +63,7 @@ impl Schema {
         if format > 6 && !inputs.iter().all(|input| input.colors) {
             progress.note(&format!("{} without colours become black", named(inputs, |input| !input.colors)));
         }
-        let layout = Extras::join(inputs, progress)?;
+        let layout = Extras::join(inputs.iter().map(|input| (&*input.name, &input.extras)), progress)?;
         let record_len = las::RECORD_LEN[format] + layout.len();
         if record_len > usize::from(u16::MAX) {
             let what = format!("a point would take {record_len} bytes; LAS allows {}", u16::MAX);

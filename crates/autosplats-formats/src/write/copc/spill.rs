@@ -2,9 +2,9 @@
 //!
 //! # How it works
 //!
-//! The file has no name, so the system removes it whatever ends the program. A cell gathers records in memory and writes
-//! them as a slot once they fill one. All cells together hold no more memory than they may: beyond it, all that is
-//! gathered is written, as slots that are not full. Slots that were read are used again.
+//! The file has no name, so the system removes it whatever ends the program. A cell gathers records in memory and
+//! writes them as a slot once they fill one. All cells together hold no more memory than they may: beyond it, all that
+//! is gathered is written, as slots that are not full. Slots that were read are used again.
 
 use std::{
     fs::File,

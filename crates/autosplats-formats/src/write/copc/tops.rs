@@ -9,8 +9,8 @@ use autosplats_cloud::Error;
 use rayon::prelude::*;
 
 use super::{
-    build::{Node, Top},
-    compress::Compressor,
+    build::Top,
+    compress::{Compressor, Node},
     file::TreeFile,
     frame::CELL_BITS,
     key::Place,

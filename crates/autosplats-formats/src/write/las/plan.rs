@@ -7,9 +7,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    super::{Job, colors},
+    super::Job,
     grid,
-    shape::{Shape, Survey, angle_steps},
+    shape::{Shape, Survey, angle_steps, wide_colors},
 };
 use crate::las::{self, Place};
 
@@ -144,14 +144,6 @@ fn each(records: &mut [u8], len: usize, point: &impl Fn(usize) -> usize, put: im
 
 fn place_at<const LEN: usize>(record: &mut [u8], at: usize, bytes: [u8; LEN]) {
     record[at..at + LEN].copy_from_slice(&bytes);
-}
-
-/// The 16-bit colour fields.
-pub(super) fn wide_colors(cloud: &PointCloud) -> Option<[&[u16]; 3]> {
-    match colors::wide_colors(cloud)? {
-        [FieldValues::U16(red), FieldValues::U16(green), FieldValues::U16(blue)] => Some([red, green, blue]),
-        _ => None,
-    }
 }
 
 /// Indices of the points with finite coordinates; `None` if all are.

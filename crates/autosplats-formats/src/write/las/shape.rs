@@ -6,7 +6,7 @@ use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, Progress, each_type
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{super::colors, plan::wide_colors};
+use super::super::colors;
 use crate::las::{self, ANGLE_STEP, EXTRA_DESCRIPTOR, Place};
 
 /// 2⁵³: up to it, `f64` holds all integers.
@@ -394,4 +394,12 @@ fn name_of(raw: &[u8; EXTRA_DESCRIPTOR]) -> String {
 /// A name for display in a message.
 fn shown(name: &str) -> String {
     printable(&name.chars().take(60).collect::<String>())
+}
+
+/// The 16-bit colour fields.
+pub(super) fn wide_colors(cloud: &PointCloud) -> Option<[&[u16]; 3]> {
+    match colors::wide_colors(cloud)? {
+        [FieldValues::U16(red), FieldValues::U16(green), FieldValues::U16(blue)] => Some([red, green, blue]),
+        _ => None,
+    }
 }
