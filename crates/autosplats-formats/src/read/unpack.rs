@@ -8,8 +8,8 @@ use flate2::bufread::GzDecoder;
 /// First bytes of a file that gzip compressed.
 const GZIP: &[u8] = &[0x1f, 0x8b, 8];
 
-/// Bytes decompressed between two checks of the memory and of cancellation.
-const STEP: usize = 1 << 24;
+/// Fewest and most bytes decompressed between two checks of the memory and of cancellation.
+const STEPS: [usize; 2] = [1 << 16, 1 << 24];
 
 /// The bytes that a reader gets.
 pub(super) struct Unpacked<'a> {
@@ -53,12 +53,13 @@ fn decompress(path: &Path, mut rest: &[u8], progress: &dyn Progress) -> Result<(
         loop {
             progress.tick(0.0)?;
             // A few kilobytes may decompress to gigabytes, so memory is asked for step by step.
-            if bytes.capacity() - bytes.len() < STEP {
-                let more = bytes.len().max(STEP);
+            let step = bytes.len().clamp(STEPS[0], STEPS[1]);
+            if bytes.capacity() - bytes.len() < step {
+                let more = bytes.len().max(step);
                 check_memory(&what, (bytes.len() + more) as u64)?;
                 bytes.try_reserve(more).map_err(|_| Error::OutOfMemory { what: what.clone(), bytes: more })?;
             }
-            let read = decoder.by_ref().take(STEP as u64).read_to_end(&mut bytes).map_err(|error| {
+            let read = decoder.by_ref().take(step as u64).read_to_end(&mut bytes).map_err(|error| {
                 let at = whole - decoder.get_ref().len();
                 let why = if error.kind() == std::io::ErrorKind::UnexpectedEof { "is cut off" } else { "is damaged" };
                 Error::malformed(path, format!("byte {at}"), format!("the compressed data {why}; copy the file again"))
