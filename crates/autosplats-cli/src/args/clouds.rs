@@ -24,8 +24,8 @@ Examples:
   autosplats convert bun000.ply bun045.ply all.ply --pose bun045.ply=bun045.txt
   autosplats convert tiles/*.laz -o city.copc.laz --memory 4G --temp /scratch
 
-A name that ends in .copc.laz makes an octree, of any number of points: memory is bounded, and about as much disk as
-the uncompressed points take is used for a while.";
+A name that ends in .copc.laz makes an octree. About as much disk as the uncompressed points take is used for a while.
+LAS, LAZ, COPC and scenes may be larger than memory; other inputs are read whole, one at a time.";
 
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_EXAMPLES, override_usage = "autosplats convert [OPTIONS] <INPUT>... <OUT>")]

@@ -209,8 +209,8 @@ impl ShownCloud {
         (within < part.len).then(|| (part.layer, part.point(within)))
     }
 
-    /// Indices of a part of the points, ascending, that has a half of them for each of the `halvings`: of octrees the
-    /// nodes that show most, of other layers a choice by a hash of the index, so that it is always the same.
+    /// Indices of a part of the points, ascending: a half of a half, and so on, `halvings` times. Of octrees it is the
+    /// nodes that show most. Of other layers a hash of the index chooses, so that the part is always the same.
     pub(crate) fn thinned(&self, halvings: u32) -> Vec<u32> {
         let kept = |index: &u32| {
             let mixed = index.wrapping_mul(0x9E37_79B9).rotate_left(15).wrapping_mul(0x85EB_CA6B);
