@@ -16,6 +16,15 @@ pub fn available_memory() -> Option<u64> {
     Some(limit.map_or(free, |limit| free.min(limit.saturating_sub(used))))
 }
 
+/// Bounds of [`usual_memory`].
+const USUAL: [u64; 2] = [256 << 20, 2 << 30];
+
+/// Memory in bytes for work of any size that may choose how much it takes: a quarter of what is available, from 256 MiB
+/// to 2 GiB.
+pub fn usual_memory() -> u64 {
+    (available_memory().unwrap_or(USUAL[1]) / 4).clamp(USUAL[0], USUAL[1])
+}
+
 /// Requests up to this size, in bytes, are not checked: asking the system takes longer than reading such a file.
 const SMALL: u64 = 64 << 20;
 

@@ -3,7 +3,7 @@
 use std::fs::metadata;
 use std::path::Path;
 
-use autosplats_cloud::{Error, available_memory};
+use autosplats_cloud::{Error, usual_memory};
 use autosplats_formats::{TreeOptions, write_tree};
 
 use crate::args::ConvertArgs;
@@ -12,9 +12,6 @@ use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{cannot_write, folder_of};
 use crate::progress::Bar;
-
-/// Bounds of the default memory, in bytes.
-const USUAL: [u64; 2] = [256 << 20, 2 << 30];
 
 /// What the names of octrees end in.
 const ENDING: &str = ".copc.laz";
@@ -45,9 +42,8 @@ fn check(args: &ConvertArgs) -> Result<(), Failure> {
 /// Reads the inputs and writes the tree.
 pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: &Path, console: &Console) -> Result<(), Failure> {
     check(args)?;
-    let usual = || (available_memory().unwrap_or(USUAL[1]) / 4).clamp(USUAL[0], USUAL[1]);
     let options = TreeOptions {
-        memory: args.memory.unwrap_or_else(usual),
+        memory: args.memory.unwrap_or_else(usual_memory),
         temp: args.temp.clone(),
         bounds: args.part.bounds,
         keep: args.input.reading.keep.clone(),

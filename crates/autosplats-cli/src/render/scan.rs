@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use autosplats::{BYTES_PER_PIXEL, ColorMode, Detail, PlacedTree, Renderer, Shown, TreeScene};
-use autosplats_cloud::{Progress as _, Traffic, Unit, Wanted, available_memory};
+use autosplats_cloud::{Progress as _, Traffic, Unit, Wanted, usual_memory};
 
 use super::job::Job;
 use super::report::TreeReport;
@@ -16,8 +16,6 @@ use crate::progress::{Bar, Notes};
 const QUEUES: u64 = 64 << 20;
 /// Least memory for points, in bytes.
 const LEAST: u64 = 64 << 20;
-/// Bounds of the default memory, in bytes.
-const USUAL: [u64; 2] = [256 << 20, 2 << 30];
 
 /// The trees of the inputs, unless these are to be read whole.
 pub(super) fn trees(job: &Job) -> Result<Option<Vec<PlacedTree>>, Failure> {
@@ -38,6 +36,9 @@ pub(super) fn run(
     let bar = Bar::new(&format!("reading {}", job.inputs.names()), &job.console);
     let names = job.inputs.names();
     let notes = Notes::new(&bar, &names);
+    if job.supersample_is_default && job.tree.memory.is_some_and(|memory| memory < memory_beside_points(&job) + LEAST) {
+        job.supersample = 1;
+    }
     let scene = open(&job, trees, &bar)?;
     let (camera, axes) = job.camera.place(scene.sample(), None, job.size)?;
     let mut scene = scene.with_axes(axes);
@@ -95,12 +96,16 @@ pub(super) fn open(job: &Job, trees: Vec<PlacedTree>, bar: &Bar) -> Result<TreeS
     Ok(scene)
 }
 
+/// Memory in bytes of all but points.
+fn memory_beside_points(job: &Job) -> u64 {
+    let [width, height] = job.rendered_size().map(u64::from);
+    width * height * BYTES_PER_PIXEL + QUEUES
+}
+
 /// Memory for points, in bytes.
 fn memory(job: &Job) -> Result<u64, Failure> {
-    let [width, height] = job.rendered_size().map(u64::from);
-    let others = width * height * BYTES_PER_PIXEL + QUEUES;
-    let usual = || (available_memory().unwrap_or(USUAL[1]) / 4).clamp(USUAL[0], USUAL[1]).max(others + LEAST);
-    let asked = job.tree.memory.unwrap_or_else(usual);
+    let others = memory_beside_points(job);
+    let asked = job.tree.memory.unwrap_or_else(|| usual_memory().max(others + LEAST));
     if asked < others + LEAST {
         let least = (others + LEAST).div_ceil(1 << 20);
         return Err(Failure::usage(format!(

@@ -90,3 +90,41 @@ fn only_known_formats_are_written() {
     folder.fail(&["convert", "sphere.ply"], 2, &["sphere.ply", "the file to write is missing"]);
     folder.fail(&["convert", "missing.las", "out.ply"], 3, &["missing.las"]);
 }
+
+#[test]
+fn any_inputs_become_an_octree() {
+    let folder = Folder::with_sphere();
+    let outcome =
+        folder.succeed(&["convert", "sphere.ply", "scene:figure:30K", "-o", "all.copc.laz", "--memory", "200M"]);
+    assert!(outcome.stdout.contains(&format!("{} points in", SPHERE_POINTS + 30_000)), "{}", outcome.stdout);
+    let info = folder.succeed(&["info", "all.copc.laz", "--json"]).stdout;
+    let info: serde_json::Value = serde_json::from_str(&info).expect("JSON");
+    let text = info.to_string();
+    assert!(text.contains("COPC") && text.contains(&(SPHERE_POINTS + 30_000).to_string()), "{text}");
+    // In another order of the inputs it is the same file.
+    folder.succeed(&["convert", "scene:figure:30K", "sphere.ply", "-o", "again.copc.laz"]);
+    assert!(folder.read("all.copc.laz") == folder.read("again.copc.laz"), "the order of inputs does not matter");
+    folder.succeed(&["render", "all.copc.laz", "-o", "a.png", "--size", "80x60", "--detail", "1"]);
+}
+
+#[test]
+fn what_no_octree_can_be_made_of_is_refused() {
+    let folder = Folder::with_sphere();
+    folder.write("empty.xyz", "");
+    folder.write("old.copc.laz", "precious");
+    let before = folder.list();
+    let cases: [(&[&str], u8, &[&str]); 7] = [
+        (&["sphere.ply", "a.copc.laz", "--voxel", "0.1"], 2, &["--voxel", "octree"]),
+        (&["sphere.ply", "a.ply", "--memory", "1G"], 2, &["--memory", ".copc.laz"]),
+        (&["sphere.ply", "a.copc.laz", "--temp", "nowhere"], 4, &["nowhere"]),
+        (&["sphere.ply", "a.copc.laz", "--memory", "1M"], 6, &["MiB"]),
+        (&["sphere.ply", "a.copc.laz", "--bounds", "900,900,900,901,901,901"], 3, &["--bounds"]),
+        (&["empty.xyz", "a.copc.laz"], 3, &["empty.xyz"]),
+        (&["sphere.ply", "old.copc.laz"], 4, &["--force"]),
+    ];
+    for (arguments, exit, words) in cases {
+        folder.fail(&[&["convert"], arguments].concat(), exit.into(), words);
+    }
+    assert_eq!(folder.list(), before, "nothing is left behind");
+    assert_eq!(folder.read("old.copc.laz"), b"precious");
+}

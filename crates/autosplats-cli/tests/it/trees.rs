@@ -79,11 +79,15 @@ fn limits_make_pictures_coarser_and_say_so() {
     let outcome = folder.succeed(&limited);
     assert!(outcome.stderr.contains("pixels apart; a larger --points-budget"), "{}", outcome.stderr);
     folder.fail(&["render", &lion, "-o", "b.png", "--detail", "1", "--memory", "1M"], 2, &["--memory", "at least"]);
+    // Little memory is no reason to fail while a picture without supersampling fits.
+    let tight = ["render", &lion, "-o", "c.png", "--size", "800x600", "--detail", "1", "--memory", "300M"];
+    folder.succeed(&tight);
+    folder.fail(&[&tight[..], &["--supersample", "2"]].concat(), 2, &["--memory", "at least"]);
     for wrong in ["-1", "nan", "x"] {
         folder.fail(&["render", &lion, "-o", "b.png", "--detail", wrong], 2, &["--detail", "pixels"]);
     }
     folder.fail(&["render", &lion, "-o", "b.png", "--detail", "1", "--color", "Beauty"], 2, &["Beauty", "Intensity"]);
-    assert_eq!(folder.list(), ["a.png"], "nothing else is written");
+    assert_eq!(folder.list(), ["a.png", "c.png"], "nothing else is written");
 }
 
 #[test]

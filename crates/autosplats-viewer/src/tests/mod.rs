@@ -133,6 +133,19 @@ impl Window {
         self.step();
     }
 
+    /// Turns the mouse wheel, a number of times by some lines.
+    fn wheel(&mut self, times: usize, lines: f32) {
+        for _ in 0..times {
+            self.event(Event::MouseWheel {
+                unit: egui::MouseWheelUnit::Line,
+                delta: egui::vec2(0.0, lines),
+                phase: egui::TouchPhase::Move,
+                modifiers: Modifiers::NONE,
+                source: egui::MouseWheelSource::Wheel,
+            });
+        }
+    }
+
     fn key(&mut self, modifiers: Modifiers, key: Key) {
         self.event(Event::ModifiersChanged(modifiers));
         for pressed in [true, false] {

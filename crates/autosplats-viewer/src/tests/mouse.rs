@@ -48,15 +48,7 @@ fn wheel_zooms(mut window: Window) {
     let before = camera(&window);
     let place = window.place(at.x as f32, at.y as f32);
     window.event(Event::PointerMoved(place));
-    for _ in 0..5 {
-        window.event(Event::MouseWheel {
-            unit: egui::MouseWheelUnit::Line,
-            delta: egui::vec2(0.0, 2.0),
-            phase: egui::TouchPhase::Move,
-            modifiers: Modifiers::NONE,
-            source: egui::MouseWheelSource::Wheel,
-        });
-    }
+    window.wheel(5, 2.0);
     window.settle();
     let after = camera(&window);
     let [far, near] = [&before, &after].map(|camera| camera.eye.distance(world));

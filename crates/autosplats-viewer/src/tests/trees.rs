@@ -58,14 +58,16 @@ fn chosen(window: &Window, detail: f64) -> BTreeSet<NodeAt> {
 #[test]
 fn an_octree_is_coarse_at_once_and_then_what_a_render_shows() {
     let Some(scans) = scans() else { return };
-    let server = Server::start(scans.clone(), Duration::from_millis(150)).expect("a server");
+    let server = Server::start(scans.clone(), Duration::from_millis(400)).expect("a server");
     let near = path(&scans, STAR);
     for name in [&*near, &server.address(STAR)] {
         let mut window = window(0.2, &[name]);
         window.until("the first points", |window| !window.app().session.document().layers.is_empty());
         let first = layer(&window).cloud.len();
         if name != near {
-            window.until("how much there is", |window| window.says(" of 518,862 points"));
+            window.until("how much there is", |window| window.app().session.trees.status().is_some());
+            window.step();
+            assert!(window.says(" of 518,862 points"), "{:?}", window.words());
             let status = window.app().session.trees.status().expect("an octree is open");
             assert!(status.there < status.needed && !status.complete, "{status:?}");
         }
@@ -89,15 +91,7 @@ fn a_view_that_moves_has_what_it_needs_when_it_rests() {
     assert_eq!(far, chosen(&window, 1.0));
     let place = window.place(0.5, 0.5);
     window.event(Event::PointerMoved(place));
-    for _ in 0..12 {
-        window.event(Event::MouseWheel {
-            unit: egui::MouseWheelUnit::Line,
-            delta: egui::vec2(0.0, 5.0),
-            phase: egui::TouchPhase::Move,
-            modifiers: Modifiers::NONE,
-            source: egui::MouseWheelSource::Wheel,
-        });
-    }
+    window.wheel(12, 5.0);
     window.settle();
     let close = nodes(layer(&window));
     assert_eq!(close, chosen(&window, 1.0), "as if it had always been there");

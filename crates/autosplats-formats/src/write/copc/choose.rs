@@ -99,9 +99,7 @@ impl Chosen {
         for &(name, place) in &self.places {
             let Place::Bits { at, shift, mask } = place else { continue };
             let values = records.chunks_exact(self.record_len).map(|record| record[at] >> shift & mask).collect();
-            if let Ok(with) = cloud.clone().with_field(name, FieldValues::U8(values)) {
-                cloud = with;
-            }
+            cloud = cloud.with_field(name, FieldValues::U8(values)).expect("a value for each record");
         }
         let left = filter.left_out(&cloud);
         self.inside.fetch_add(count as u64, Ordering::Relaxed);

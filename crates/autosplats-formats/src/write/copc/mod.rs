@@ -41,7 +41,9 @@ use std::{
     },
 };
 
-use autosplats_cloud::{Error, Part as PartOf, PointCloud, PointFilter, Progress, free_disk, write_whole};
+use autosplats_cloud::{
+    Error, Part as PartOf, PointCloud, PointFilter, Progress, free_disk, usual_memory, write_whole,
+};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -73,9 +75,6 @@ const OUTPUT_PART: u64 = 3;
 
 /// Part of the progress that reading takes.
 const READING: f32 = 0.45;
-
-/// Memory for making a tree of a cloud in memory, beside it.
-const CLOUD_MEMORY: u64 = 1 << 30;
 
 /// How a tree is made.
 #[derive(Clone, Debug, Default)]
@@ -144,9 +143,10 @@ fn make(
         holds.push(source.holds(progress)?);
     }
     let points: u64 = holds.iter().map(|input| input.points).sum();
+    let empty = holds.first().map_or_else(|| path.to_owned(), |input| input.name.clone());
     let mut filled: Vec<Holds> = holds.into_iter().filter(|input| input.points > 0).collect();
     if points == 0 {
-        return Err(Error::unsupported(path, "there are no points, and an octree needs one"));
+        return Err(Error::unsupported(&empty, "there are no points, and an octree needs one"));
     }
     if let Some([min, max]) = options.bounds {
         filled.retain(|input| input.bounds[0].cmple(max).all() && input.bounds[1].cmpge(min).all());
@@ -194,7 +194,7 @@ pub(super) const FORMAT: Format = Format {
     extensions: &["copc.laz"],
     write: |job, file| {
         let held = Held { path: job.path, cloud: job.cloud };
-        let options = TreeOptions { memory: CLOUD_MEMORY, ..TreeOptions::default() };
+        let options = TreeOptions { memory: usual_memory(), ..TreeOptions::default() };
         make(vec![TreeInput::Clouds(Box::new(held))], job.path, &options, job.progress, file).map(drop)
     },
 };

@@ -1,10 +1,7 @@
 //! How many points fit into the memory.
 
-use autosplats::cloud::available_memory;
 use autosplats::{BYTES_PER_PIXEL, still_supersample};
 
-/// Bounds of the default memory, in bytes.
-const USUAL_MEMORY: [u64; 2] = [256 << 20, 2 << 30];
 /// Memory of nodes on their way from the file, in bytes.
 const QUEUES: u64 = 64 << 20;
 /// Least memory for points, in bytes.
@@ -58,11 +55,6 @@ impl Limits {
         let fits = points / 2 / clouds / point_bytes.max(1) as u64;
         Self { max_points: max_points.min(fits as usize).max(1), stored_bytes: (points / 2) as usize }
     }
-}
-
-/// The default memory, in bytes.
-pub(super) fn usual_memory() -> u64 {
-    (available_memory().unwrap_or(USUAL_MEMORY[1]) / 4).clamp(USUAL_MEMORY[0], USUAL_MEMORY[1])
 }
 
 /// Bytes of all but points.

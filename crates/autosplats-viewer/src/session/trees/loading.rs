@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use autosplats::cloud::glam::DMat4;
-use autosplats::cloud::{Error as CloudError, Key, Node, NodeKey, Progress as _, Wanted};
+use autosplats::cloud::{Error as CloudError, Key, Node, NodeKey, Progress as _, Wanted, usual_memory};
 use autosplats::{Choice, Detail, Error, NodePoints, PlacedTree, choose, load_nodes};
 use rayon::{ThreadPool, ThreadPoolBuilder, current_num_threads};
 
-use super::limits::{Limits, usual_memory};
+use super::limits::Limits;
 use super::mailbox::{Follower, Shared};
 use super::store::{Store, id_of};
 use super::{ShownNodes, TreeOptions, TreeStatus, Wish, WishedTree};

@@ -162,7 +162,8 @@ impl Shared {
     #[cfg(test)]
     pub(super) fn is_idle(&self) -> bool {
         let post = self.lock();
-        post.ended == post.number && post.nodes.is_empty() && post.orders.is_empty()
+        let at_rest = post.wish.as_ref().is_none_or(|wish| wish.sight.moving.is_none());
+        at_rest && post.ended == post.number && post.nodes.is_empty() && post.orders.is_empty()
     }
 }
 

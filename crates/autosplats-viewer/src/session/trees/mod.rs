@@ -176,7 +176,7 @@ impl Trees {
         TreeHandle(Arc::clone(&self.shared))
     }
 
-    /// Whether all that was wished is done, or has failed.
+    /// Whether all that was wished is done, or has failed, and the view is at rest.
     #[cfg(test)]
     pub(crate) fn is_idle(&self) -> bool {
         self.shared.is_idle()
