@@ -61,33 +61,23 @@ impl PointCloud {
     /// # Ok::<(), autosplats_cloud::Error>(())
     /// ```
     pub fn thin_by_voxel(&mut self, size: f64, progress: &dyn Progress) -> Result<(), Error> {
-        if !(size > 0.0 && size.is_finite()) {
-            return Err(Error::BadValue { name: "voxel size", value: size, rule: "above 0" });
-        }
+        check_voxel(size)?;
         progress.tick(0.0)?;
         let mut cells: Vec<([i64; 3], u32)> = (0..self.len())
             .into_par_iter()
-            .filter_map(|i| {
-                let cell = (self.world_position(i) / size).floor();
-                cell.is_finite().then(|| (cell.to_array().map(|value| value as i64), i as u32))
+            .filter_map(|i| match cube(self.world_position(i), size) {
+                Ok(cell) => cell.map(|cell| Ok((cell, i as u32))),
+                Err(error) => Some(Err(error)),
             })
-            .collect();
-        if cells.par_iter().any(|(cell, _)| cell.iter().any(|&value| value.unsigned_abs() > 1 << 52)) {
-            return Err(Error::BadValue { name: "voxel size", value: size, rule: "larger for these coordinates" });
-        }
+            .collect::<Result<_, Error>>()?;
         progress.tick(0.2)?;
         // Sorting puts the points of a cube side by side, in the file's order.
         cells.par_sort_unstable();
         progress.tick(0.8)?;
         let mut keep = vec![false; self.len()];
         for cube in cells.chunk_by(|(a, _), (b, _)| a == b) {
-            let point = |&(_, index): &([i64; 3], u32)| self.world_position(index as usize) - self.origin;
-            let mean = cube.iter().map(point).sum::<DVec3>() / cube.len() as f64;
-            let distance = |entry: &&([i64; 3], u32)| point(entry).distance_squared(mean);
-            let nearest = cube.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            if let Some((_, index)) = nearest {
-                keep[*index as usize] = true;
-            }
+            let point = |i: usize| self.world_position(cube[i].1 as usize) - self.origin;
+            keep[cube[nearest_to_mean(cube.len(), point)].1 as usize] = true;
         }
         drop(cells);
         self.retain(|i| keep[i]);
@@ -100,6 +90,17 @@ impl PointCloud {
     /// # Errors
     /// [`Error::BadValue`] if `sigma` is not zero or above; [`Error::Cancelled`] if `progress` says so.
     pub fn add_noise(&mut self, sigma: f64, seed: u64, progress: &dyn Progress) -> Result<(), Error> {
+        self.add_noise_from(0, sigma, seed, progress)
+    }
+
+    /// Like [`add_noise`](Self::add_noise), of a part of a cloud, before which there are `before` points.
+    pub(crate) fn add_noise_from(
+        &mut self,
+        before: u64,
+        sigma: f64,
+        seed: u64,
+        progress: &dyn Progress,
+    ) -> Result<(), Error> {
         if !(sigma >= 0.0 && sigma.is_finite()) {
             return Err(Error::BadValue { name: "noise", value: sigma, rule: "0 or above" });
         }
@@ -108,7 +109,7 @@ impl PointCloud {
         for start in (0..self.len()).step_by(BLOCK) {
             progress.tick(start as f32 / self.len() as f32)?;
             let end = self.len().min(start + BLOCK);
-            let moved = |i: usize| self.world_position(i) - self.origin + sigma * normal(seed, i as u64);
+            let moved = |i: usize| self.world_position(i) - self.origin + sigma * normal(seed, before + i as u64);
             let moved: Vec<DVec3> = (start..end).into_par_iter().map(moved).collect();
             for (position, moved) in self.positions[start..end].iter_mut().zip(&moved) {
                 *position = moved.as_vec3().to_array();
@@ -119,6 +120,34 @@ impl PointCloud {
         }
         progress.tick(1.0)
     }
+}
+
+/// Fails for sizes that cannot be.
+pub(crate) fn check_voxel(size: f64) -> Result<(), Error> {
+    if size > 0.0 && size.is_finite() {
+        return Ok(());
+    }
+    Err(Error::BadValue { name: "voxel size", value: size, rule: "above 0" })
+}
+
+/// The cube that a place lies in; `None` if it is not finite.
+pub(crate) fn cube(place: DVec3, size: f64) -> Result<Option<[i64; 3]>, Error> {
+    let cell = (place / size).floor();
+    if !cell.is_finite() {
+        return Ok(None);
+    }
+    let cell = cell.to_array().map(|value| value as i64);
+    if cell.iter().any(|&value| value.unsigned_abs() > 1 << 52) {
+        return Err(Error::BadValue { name: "voxel size", value: size, rule: "larger for these coordinates" });
+    }
+    Ok(Some(cell))
+}
+
+/// Which of some points, at least one, is nearest to their mean; the first of several.
+pub(crate) fn nearest_to_mean(count: usize, point: impl Fn(usize) -> DVec3) -> usize {
+    let mean = (0..count).map(&point).sum::<DVec3>() / count as f64;
+    let distance = |i: &usize| point(*i).distance_squared(mean);
+    (0..count).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
 }
 
 /// Three normally distributed numbers, by the Box-Muller method.

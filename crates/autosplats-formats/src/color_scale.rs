@@ -99,6 +99,15 @@ impl ColorScale {
         Self { index, levels }
     }
 
+    /// Every scale there is, by [`number`](Self::number).
+    pub(crate) fn all() -> [Self; 3] {
+        [0, 1, 2].map(|index| Self { index, levels: Levels::default() })
+    }
+
+    pub(crate) fn number(self) -> usize {
+        self.index
+    }
+
     /// The value of full brightness: 1, 255 or 65535.
     pub(crate) fn full(self) -> f64 {
         FULL[self.index]

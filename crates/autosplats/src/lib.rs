@@ -51,7 +51,10 @@ pub use detail::{
 };
 pub use error::{Error, MAX_SIDE};
 pub use gpu::{AdapterSummary, PassTime, adapters};
-pub use normals::{NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};
+pub use normals::{
+    NormalSettings, Normals, NormalsInParts, Orientation, PartsOptions, Viewpoint, estimate_normals,
+    estimate_normals_in_parts,
+};
 pub use points::Points;
 pub use renderer::{
     BYTES_PER_PIXEL, Backend, Counts, Frame, PointSurfel, RadiusTrial, Reconstruction, Renderer, Settings, Timings,

@@ -2,7 +2,9 @@
 
 use std::{fs::File, io::BufWriter, path::Path};
 
-use autosplats_cloud::{Crs, Error, PointCloud, Progress, one_line};
+use autosplats_cloud::{Clouds, Error, PointCloud, Progress, one_line};
+
+use super::facts::Facts;
 
 /// A file format that can be written.
 pub(super) struct Format {
@@ -15,9 +17,20 @@ pub(super) struct Format {
 
 /// Input of every writer.
 pub(super) struct Job<'a> {
-    pub(super) cloud: &'a PointCloud,
+    pub(super) clouds: &'a dyn Clouds,
     pub(super) path: &'a Path,
     pub(super) progress: &'a dyn Progress,
+}
+
+/// A progress that reports nothing, since the writer does, but cancels.
+pub(super) struct Quiet<'a>(pub(super) &'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn report(&self, _fraction: f32) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
 }
 
 impl Job<'_> {
@@ -33,15 +46,29 @@ impl Job<'_> {
     pub(super) fn note(&self, note: impl AsRef<str>) {
         self.progress.note(&one_line(note.as_ref()));
     }
+
+    /// Passes on the clouds, of which there is at least one.
+    pub(super) fn each(&self, take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>) -> Result<(), Error> {
+        let mut none = true;
+        self.clouds.read(&Quiet(self.progress), &mut |cloud| {
+            none = false;
+            if self.progress.cancelled() { Err(Error::Cancelled) } else { take(cloud) }
+        })?;
+        if none { take(&PointCloud::default()) } else { Ok(()) }
+    }
+
+    /// The points in one cloud, for formats that need all at once.
+    pub(super) fn whole(&self, format: &str) -> Result<&PointCloud, Error> {
+        self.clouds.whole().ok_or_else(|| {
+            let what = format!("{format} is written from memory, which does not hold all points; write .laz or .ply");
+            Error::unsupported(self.path, what)
+        })
+    }
 }
 
-/// Notes that `format` cannot hold the sensors, the coordinate system and `others`, as far as the cloud has them.
-pub(super) fn note_left_out(job: &Job<'_>, format: &str, others: &[(bool, &str)]) {
-    let cloud = job.cloud;
-    let all = [
-        (!cloud.scans().is_empty(), "the poses of the sensors"),
-        (*cloud.crs() != Crs::default(), "the coordinate system"),
-    ];
+/// Notes that `format` cannot hold the sensors, the coordinate system and `others`, as far as the points have them.
+pub(super) fn note_left_out(job: &Job<'_>, facts: &Facts, format: &str, others: &[(bool, &str)]) {
+    let all = [(facts.scans, "the poses of the sensors"), (facts.system, "the coordinate system")];
     let losses: Vec<&str> = all.iter().chain(others).filter(|(lost, _)| *lost).map(|(_, what)| *what).collect();
     if !losses.is_empty() {
         job.note(format!("{format} does not hold {}", losses.join(", ")));

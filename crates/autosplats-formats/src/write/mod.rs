@@ -10,6 +10,7 @@ mod colors;
 mod copc;
 mod decimal;
 mod e57;
+mod facts;
 mod job;
 mod las;
 mod names;
@@ -19,6 +20,6 @@ mod records;
 mod registry;
 mod xyz;
 
-pub use self::copc::{Clouds, TreeInput, TreeOptions, TreeSummary, write_tree};
+pub use self::copc::{TreeInput, TreeOptions, TreeSummary, write_tree};
 use self::job::{Format, Job, note_left_out};
-pub use self::registry::{check_writable, write, written_formats};
+pub use self::registry::{check_writable, write, write_clouds, written_formats};

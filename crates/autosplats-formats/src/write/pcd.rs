@@ -5,43 +5,40 @@ use std::{
     io::{BufWriter, Write as _},
 };
 
-use autosplats_cloud::{Crs, Error, Field, FieldValues, PointCloud, each_type};
-use glam::{DMat4, DQuat, DVec3};
+use autosplats_cloud::{Error, Field, FieldValues, PointCloud, each_type};
+use glam::{DMat4, DQuat};
 
-use super::{Format, Job, names::unique_names, records::write_records};
+use super::{Format, Job, facts::Facts, names::unique_names, records::Records};
 
 pub(super) const FORMAT: Format = Format { name: "PCD", extensions: &["pcd"], write };
 
 /// Writes positions as 32-bit floats if the cloud's origin is zero, otherwise world coordinates as 64-bit floats. Most
 /// programs read 32-bit floats only. Colours are packed into a field `rgb`.
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
-    let cloud = job.cloud;
-    let layout = Layout::of(cloud);
-    note_losses(job);
-    file.write_all(layout.header(cloud).as_bytes()).map_err(|source| job.io(source))?;
-    write_records(job, file, layout.stride, |first, records| layout.encode(cloud, first, records))
+    let facts = Facts::of(job)?;
+    note_losses(job, &facts);
+    let mut records = Records::new(facts.points);
+    let mut begun = false;
+    job.each(&mut |cloud| {
+        let layout = Layout::of(cloud, &facts);
+        if !std::mem::replace(&mut begun, true) {
+            file.write_all(layout.header(cloud, &facts).as_bytes()).map_err(|source| job.io(source))?;
+        }
+        records.write(job, file, cloud, layout.stride, |first, records| layout.encode(cloud, first, records))
+    })
 }
 
-fn note_losses(job: &Job<'_>) {
-    let cloud = job.cloud;
-    if cloud.origin() != DVec3::ZERO {
+fn note_losses(job: &Job<'_>, facts: &Facts) {
+    if facts.origin {
         job.note("coordinates this large are written as 64-bit floats, which some programs do not read");
-    } else if cloud.residuals().is_some() {
+    } else if facts.residuals {
         job.note("coordinates are rounded to 32-bit floats, which is what programs read from PCD");
     }
-    if *cloud.crs() != Crs::default() {
+    if facts.system {
         job.note("PCD does not hold the coordinate system");
     }
-    if !cloud.scans().is_empty() && only_pose(cloud).is_none() {
+    if facts.scans && facts.only_pose.is_none() {
         job.note("PCD holds one sensor pose for all points; several are left out");
-    }
-}
-
-/// The pose of the sensor, if one sensor saw all points.
-fn only_pose(cloud: &PointCloud) -> Option<DMat4> {
-    match cloud.scans() {
-        [scan] if scan.points == (0..cloud.len()) => Some(scan.world_from_sensor),
-        _ => None,
     }
 }
 
@@ -53,8 +50,8 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(cloud: &PointCloud) -> Self {
-        let doubles = cloud.origin() != DVec3::ZERO;
+    fn of(cloud: &PointCloud, facts: &Facts) -> Self {
+        let doubles = facts.origin;
         let fields: usize = cloud.fields().iter().map(|field| scalar(&field.values).1).sum();
         let stride = if doubles { 24 } else { 12 } + if cloud.colors().is_some() { 4 } else { 0 } + fields;
         let all: Vec<&Field> = cloud.fields().iter().collect();
@@ -62,7 +59,7 @@ impl Layout {
         Self { doubles, names: unique_names(&all, &["x", "y", "z", "rgb", "rgba", "_"]), stride }
     }
 
-    fn header(&self, cloud: &PointCloud) -> String {
+    fn header(&self, cloud: &PointCloud, facts: &Facts) -> String {
         let position = if self.doubles { ('F', 8) } else { ('F', 4) };
         let mut fields: Vec<(&str, char, usize)> = ["x", "y", "z"].map(|axis| (axis, position.0, position.1)).into();
         if cloud.colors().is_some() {
@@ -81,9 +78,9 @@ impl Layout {
             };
             fields.push((name, kind, size));
         }
-        let axes = cloud.axes().map_or_else(String::new, |axes| format!("# axes {}\n", axes.name()));
+        let axes = facts.axes.map_or_else(String::new, |axes| format!("# axes {}\n", axes.name()));
         // The default viewpoint may mean a sensor at the origin or none.
-        let sensor = if only_pose(cloud).is_some() { "# sensor at VIEWPOINT\n" } else { "" };
+        let sensor = if facts.only_pose.is_some() { "# sensor at VIEWPOINT\n" } else { "" };
         let words =
             |word: &dyn Fn(&(&str, char, usize)) -> String| fields.iter().map(word).collect::<Vec<_>>().join(" ");
         format!(
@@ -93,8 +90,8 @@ impl Layout {
             words(&|field| field.2.to_string()),
             words(&|field| field.1.into()),
             words(&|_| "1".into()),
-            viewpoint(only_pose(cloud).unwrap_or(DMat4::IDENTITY)),
-            len = cloud.len(),
+            viewpoint(facts.only_pose.unwrap_or(DMat4::IDENTITY)),
+            len = facts.points,
         )
     }
 

@@ -7,42 +7,32 @@ use std::{
 };
 
 use autosplats_cloud::{Error, Field, FieldValues, PointCloud, each_type};
-use rayon::prelude::*;
 
 use super::{
     Format, Job,
-    colors::{CHANNELS, wide_colors},
+    colors::{CHANNELS, channels},
+    facts::Facts,
     note_left_out,
-    records::write_records,
+    records::Records,
 };
 
 pub(super) const FORMAT: Format = Format { name: "PLY", extensions: &["ply"], write };
 
-/// Largest integer up to which `f64` holds all integers.
-const MAX_EXACT_INTEGER: u64 = 1 << 53;
-
-/// Writes positions as 32-bit floats if the cloud has neither an origin nor residuals, otherwise world coordinates as
+/// Writes positions as 32-bit floats if the points have neither an origin nor residuals, otherwise world coordinates as
 /// 64-bit floats. Blanks in field names become underscores.
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
-    let cloud = job.cloud;
-    let layout = Layout::of(cloud);
-    note_losses(job);
-    file.write_all(layout.header(cloud).as_bytes()).map_err(|source| job.io(source))?;
-    write_records(job, file, layout.stride, |first, records| layout.encode(cloud, first, records))
-}
-
-fn note_losses(job: &Job<'_>) {
-    note_left_out(job, "PLY", &[]);
-    for field in job.cloud.fields() {
-        let beyond = match &field.values {
-            FieldValues::U64(values) => values.par_iter().any(|&value| value > MAX_EXACT_INTEGER),
-            FieldValues::I64(values) => values.par_iter().any(|&value| value.unsigned_abs() > MAX_EXACT_INTEGER),
-            _ => false,
-        };
-        if beyond {
-            job.note(format!("{}: integers beyond 53 bits are rounded", field.name));
+    let facts = Facts::of(job)?;
+    note_left_out(job, &facts, "PLY", &[]);
+    facts.beyond.iter().for_each(|name| job.note(format!("{name}: integers beyond 53 bits are rounded")));
+    let mut records = Records::new(facts.points);
+    let mut begun = false;
+    job.each(&mut |cloud| {
+        let layout = Layout::of(cloud, &facts);
+        if !std::mem::replace(&mut begun, true) {
+            file.write_all(layout.header(&facts).as_bytes()).map_err(|source| job.io(source))?;
         }
-    }
+        records.write(job, file, cloud, layout.stride, |first, records| layout.encode(cloud, first, records))
+    })
 }
 
 /// Layout of a record: positions, colours, fields.
@@ -61,9 +51,9 @@ enum Colors<'a> {
 }
 
 impl<'a> Layout<'a> {
-    fn of(cloud: &'a PointCloud) -> Self {
-        let doubles = cloud.origin() != glam::DVec3::ZERO || cloud.residuals().is_some();
-        let wide = wide_colors(cloud);
+    fn of(cloud: &'a PointCloud, facts: &Facts) -> Self {
+        let doubles = facts.origin || facts.residuals;
+        let wide = channels(cloud).filter(|_| facts.are_wide());
         let is_color = |field: &&Field| wide.is_some() && CHANNELS.contains(&&*field.name);
         let fields: Vec<&Field> = cloud.fields().iter().filter(|field| !is_color(field)).collect();
         let colors = wide.map(Colors::Wide).or_else(|| cloud.colors().map(Colors::Bytes));
@@ -73,10 +63,10 @@ impl<'a> Layout<'a> {
         Self { doubles, colors, names: property_names(&fields), fields, stride }
     }
 
-    fn header(&self, cloud: &PointCloud) -> String {
+    fn header(&self, facts: &Facts) -> String {
         let mut header = String::from("ply\nformat binary_little_endian 1.0\n");
-        header += &cloud.axes().map_or_else(String::new, |axes| format!("comment axes {}\n", axes.name()));
-        header += &format!("element vertex {}\n", cloud.len());
+        header += &facts.axes.map_or_else(String::new, |axes| format!("comment axes {}\n", axes.name()));
+        header += &format!("element vertex {}\n", facts.points);
         for axis in ["x", "y", "z"] {
             header += &format!("property {} {axis}\n", if self.doubles { "double" } else { "float" });
         }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use autosplats_cloud::{Error, PointCloud, Progress, write_whole};
+use autosplats_cloud::{Clouds, Error, Held, PointCloud, Progress, write_whole};
 
 use super::{
     copc, e57,
@@ -41,7 +41,31 @@ pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'stat
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn write(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result<(), Error> {
-    let job = Job { cloud, path, progress };
+    write_clouds(&Held { name: path, cloud }, path, progress)
+}
+
+/// Like [`write()`], of points that come in parts. They are read two or three times, and memory needs to hold only a
+/// part of them. The file has the same bytes as if all came at once.
+///
+/// # Errors
+/// Those of [`write()`] and of reading; [`Error::Unsupported`] for parts of unlike fields, and for formats that are
+/// written from memory (E57).
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{Held, PointCloud, glam::DVec3};
+/// use autosplats_formats::{read, write_clouds};
+///
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("points.laz");
+/// let cloud = PointCloud::new(DVec3::ZERO, vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+/// write_clouds(&Held { name: "memory".as_ref(), cloud: &cloud }, &path, &())?;
+/// assert_eq!(read(&path, &())?.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write_clouds(clouds: &dyn Clouds, path: &Path, progress: &dyn Progress) -> Result<(), Error> {
+    let job = Job { clouds, path, progress };
     let format = format(path)?;
     write_whole(
         path,

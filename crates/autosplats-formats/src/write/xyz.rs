@@ -14,8 +14,9 @@ use rayon::prelude::*;
 
 use super::{
     Format, Job,
-    colors::{CHANNELS, wide_colors},
+    colors::{CHANNELS, channels},
     decimal,
+    facts::Facts,
     names::unique_names,
     note_left_out,
 };
@@ -44,27 +45,35 @@ enum Channels<'a> {
 }
 
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
-    let cloud = job.cloud;
+    let facts = Facts::of(job)?;
     let extension = job.path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
-    let (layout, header) = if extension == "pts" { pts(job) } else { table(cloud, Path::new(&extension)) };
-    let up = (cloud.axes().is_some(), "which axis is up");
-    note_left_out(job, "text", &[up]);
-    file.write_all(header.as_bytes()).map_err(|source| job.io(source))?;
-    for start in (0..cloud.len()).step_by(PIECE * BATCH) {
-        job.tick(start as f32 / cloud.len() as f32)?;
-        let end = cloud.len().min(start + PIECE * BATCH);
-        let starts = (start..end).into_par_iter().step_by(PIECE);
-        let pieces: Vec<Vec<u8>> = starts.map(|from| layout.rows(cloud, from..end.min(from + PIECE))).collect();
-        for piece in pieces {
-            file.write_all(&piece).map_err(|source| job.io(source))?;
+    let is_pts = extension == "pts";
+    let io = |source| job.io(source);
+    let (mut begun, mut done) = (false, 0);
+    job.each(&mut |cloud| {
+        let (layout, header) = if is_pts { pts(cloud, &facts) } else { table(cloud, &facts, Path::new(&extension)) };
+        if !std::mem::replace(&mut begun, true) {
+            if is_pts {
+                note_lost_fields(job, cloud);
+            }
+            note_left_out(job, &facts, "text", &[(facts.axes.is_some(), "which axis is up")]);
+            file.write_all(header.as_bytes()).map_err(io)?;
         }
-    }
-    Ok(())
+        for start in (0..cloud.len()).step_by(PIECE * BATCH) {
+            job.tick(done as f32 / facts.points as f32)?;
+            let end = cloud.len().min(start + PIECE * BATCH);
+            let starts = (start..end).into_par_iter().step_by(PIECE);
+            let pieces: Vec<Vec<u8>> = starts.map(|from| layout.rows(cloud, from..end.min(from + PIECE))).collect();
+            pieces.iter().try_for_each(|piece| file.write_all(piece)).map_err(io)?;
+            done += (end - start) as u64;
+        }
+        Ok(())
+    })
 }
 
 /// A line of names and all values.
-fn table<'a>(cloud: &'a PointCloud, extension: &Path) -> (Layout<'a>, String) {
-    let wide = wide_colors(cloud);
+fn table<'a>(cloud: &'a PointCloud, facts: &Facts, extension: &Path) -> (Layout<'a>, String) {
+    let wide = channels(cloud).filter(|_| facts.are_wide());
     let is_color = |field: &&Field| wide.is_some() && CHANNELS.contains(&&*field.name);
     let fields: Vec<&Field> = cloud.fields().iter().filter(|field| !is_color(field)).collect();
     let colors = wide.map(Channels::Wide).or_else(|| cloud.colors().map(Channels::Bytes));
@@ -79,16 +88,18 @@ fn table<'a>(cloud: &'a PointCloud, extension: &Path) -> (Layout<'a>, String) {
 }
 
 /// The number of points, then x y z, intensity and red green blue, as far as the cloud has them.
-fn pts<'a>(job: &Job<'a>) -> (Layout<'a>, String) {
-    let cloud = job.cloud;
+fn pts<'a>(cloud: &'a PointCloud, facts: &Facts) -> (Layout<'a>, String) {
     let fields: Vec<&Field> = cloud.field("Intensity").into_iter().collect();
-    let lost: Vec<&str> =
-        cloud.fields().iter().map(|field| field.name.as_str()).filter(|name| *name != "Intensity").collect();
+    let colors = cloud.colors().map(Channels::Bytes);
+    (Layout { separator: b' ', colors, fields, fields_first: true }, format!("{}\n", facts.points))
+}
+
+fn note_lost_fields(job: &Job<'_>, cloud: &PointCloud) {
+    let names = cloud.fields().iter().map(|field| field.name.as_str());
+    let lost: Vec<&str> = names.filter(|name| *name != "Intensity").collect();
     if !lost.is_empty() {
         job.note(format!("PTS holds only intensities and colours; left out: {}", lost.join(", ")));
     }
-    let colors = cloud.colors().map(Channels::Bytes);
-    (Layout { separator: b' ', colors, fields, fields_first: true }, format!("{}\n", cloud.len()))
 }
 
 impl Layout<'_> {

@@ -21,6 +21,7 @@ mod nearest;
 mod neighbors;
 mod orient;
 mod output;
+mod parts;
 #[cfg(test)]
 mod tests;
 mod ticker;
@@ -38,6 +39,7 @@ use self::boxes::Point;
 use self::neighbors::{Scratch, search_leaf};
 use self::orient::Sides;
 use self::output::Output;
+pub use self::parts::{NormalsInParts, PartsOptions, estimate_normals_in_parts};
 use self::ticker::Ticker;
 use self::tree::Tree;
 use crate::Error;
@@ -162,10 +164,15 @@ pub fn estimate_normals(
     settings: &NormalSettings,
     progress: &dyn Progress,
 ) -> Result<Normals, Error> {
+    check(settings)?;
+    estimate(cloud, settings, None, progress)
+}
+
+fn check(settings: &NormalSettings) -> Result<(), Error> {
     if !(3..=1024).contains(&settings.k) {
         return Err(Error::Setting { name: "k", value: settings.k.to_string(), range: "3 to 1024" });
     }
-    estimate(cloud, settings, progress)
+    Ok(())
 }
 
 /// The distance from each point to its k-th nearest in the cloud, or to the furthest point if there are fewer. NaN
@@ -174,29 +181,46 @@ pub fn estimate_normals(
 /// # Errors
 /// [`Error::TooManyPoints`], and [`Error::Cancelled`] if `progress` says so.
 pub(crate) fn exact_k_radii(cloud: &PointCloud, k: u32, progress: &dyn Progress) -> Result<Vec<f32>, Error> {
-    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, progress)?;
+    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, None, progress)?;
     // The radius of points that are not finite is not either.
     let finite = radius.iter().filter(|radius| radius.is_finite()).count() as u32;
-    let of_density = 0.5 * (k.min(finite.saturating_sub(1)).max(1) as f32).sqrt();
+    let of_density = k_radius_of(k.min(finite.saturating_sub(1)));
     Ok(radius.into_iter().map(|radius| radius * of_density).collect())
 }
 
-/// Estimates at a scale at which powers of lengths are exact enough.
-fn estimate(cloud: &PointCloud, settings: &NormalSettings, progress: &dyn Progress) -> Result<Normals, Error> {
+/// What a density radius is multiplied by for the distance to the k-th neighbour.
+fn k_radius_of(k: u32) -> f32 {
+    0.5 * (k.max(1) as f32).sqrt()
+}
+
+/// Estimates at a scale at which powers of lengths are exact enough. Outward is away from `middle`, about the cloud's
+/// origin; without one, from that of the cloud.
+fn estimate(
+    cloud: &PointCloud,
+    settings: &NormalSettings,
+    middle: Option<[f32; 3]>,
+    progress: &dyn Progress,
+) -> Result<Normals, Error> {
     let factor = cloud.computing_scale();
     if factor == 1.0 {
-        return estimate_at_scale(cloud, settings, progress);
+        return estimate_at_scale(cloud, settings, middle, progress);
     }
+    let middle = middle.map(|middle| middle.map(|value| (f64::from(value) * factor) as f32));
     let mut settings = settings.clone();
     if let Orientation::Viewpoints(viewpoints) = &mut settings.orientation {
         viewpoints.iter_mut().for_each(|viewpoint| viewpoint.position *= factor);
     }
-    let mut normals = estimate_at_scale(&cloud.scaled(factor), &settings, progress)?;
+    let mut normals = estimate_at_scale(&cloud.scaled(factor), &settings, middle, progress)?;
     normals.radius.iter_mut().for_each(|radius| *radius = (f64::from(*radius) / factor) as f32);
     Ok(normals)
 }
 
-fn estimate_at_scale(cloud: &PointCloud, settings: &NormalSettings, progress: &dyn Progress) -> Result<Normals, Error> {
+fn estimate_at_scale(
+    cloud: &PointCloud,
+    settings: &NormalSettings,
+    middle: Option<[f32; 3]>,
+    progress: &dyn Progress,
+) -> Result<Normals, Error> {
     if u32::try_from(cloud.len()).is_err() {
         return Err(Error::TooManyPoints(cloud.len()));
     }
@@ -206,7 +230,7 @@ fn estimate_at_scale(cloud: &PointCloud, settings: &NormalSettings, progress: &d
     let points = finite_points(cloud);
     ticker.tick(LISTED_PROGRESS)?;
     let tree = Tree::build(points, &|part| ticker.tick(LISTED_PROGRESS + (BUILT_PROGRESS - LISTED_PROGRESS) * part))?;
-    let sides = sides.about(tree.middle());
+    let sides = sides.about(middle.unwrap_or_else(|| tree.middle()));
     let output = Output::new(cloud.len());
     let k = settings.k.min((tree.len as u32).saturating_sub(1));
     let job = Job { tree: &tree, sides: &sides, k, output: &output };

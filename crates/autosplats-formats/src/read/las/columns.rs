@@ -61,6 +61,16 @@ impl ValueFacts {
         self.levels = self.levels.and(other.levels);
         self.bright.extend(&other.bright);
     }
+
+    /// How the colours of all points are read.
+    pub(super) fn colors(&self) -> Colors {
+        Colors::Settled { wide: self.levels.are_wide() }
+    }
+
+    /// Tells that the 16-bit colours are read as 8 bits, if they are.
+    pub(super) fn narrow_note(&self) -> Option<String> {
+        (self.colors && !self.levels.are_wide()).then(|| narrow_note(self.levels))
+    }
 }
 
 /// How colours are read, which have 16 bits in the file.
@@ -279,9 +289,25 @@ impl<'a> Columns<'a> {
     /// that the 16-bit colours are read as 8 bits.
     pub(super) fn into_cloud(mut self) -> Result<(PointCloud, Option<String>), Error> {
         self.settle_colors();
+        let told = self.seen.narrow_note();
+        Ok((self.finish()?, told))
+    }
+
+    /// Makes the cloud of some points of a file, all of which show these facts. The colours were
+    /// [settled](Colors::Settled) by them.
+    pub(super) fn into_part(mut self, facts: &ValueFacts) -> Result<PointCloud, Error> {
+        self.seen = facts.clone();
+        self.settled = None;
+        self.finish()
+    }
+
+    /// What the points show.
+    pub(super) fn into_facts(self) -> ValueFacts {
+        self.seen
+    }
+
+    fn finish(self) -> Result<PointCloud, Error> {
         let mut names = self.names().into_iter().peekable();
-        let narrow = self.seen.colors && !self.seen.levels.are_wide();
-        let told = narrow.then(|| narrow_note(self.seen.levels));
         let mut cloud = PointCloud::new(self.origin, self.positions).with_axes(Axes::ZUp);
         if self.seen.residuals {
             cloud = cloud.with_residuals(self.residuals)?;
@@ -294,7 +320,7 @@ impl<'a> Columns<'a> {
                 cloud = cloud.with_field(name, values)?;
             }
         }
-        Ok((cloud, told))
+        Ok(cloud)
     }
 }
 

@@ -20,6 +20,7 @@ mod gps_time;
 mod head;
 mod header;
 mod laz;
+mod parts;
 mod point14;
 mod records;
 mod shape;
@@ -30,11 +31,12 @@ pub(crate) use self::{
     chunks::MAX_RATIO,
     columns::{Colors, narrow_note},
     head::Head,
+    parts::LasParts,
     shape::{Decoded, Shape, read_shaped},
     stream::{Facts, Space, Stream},
 };
 
-use autosplats_cloud::{Contents, Error, Unit, degree_origin, sampled_middle};
+use autosplats_cloud::{Contents, Crs, Error, Unit, degree_origin, sampled_middle};
 use glam::DVec3;
 
 use self::{
@@ -66,8 +68,20 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     Ok(points(job, &Shape::default())?.cloud.into())
 }
 
-/// Reads the points, as far as `shape` wants them.
-fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
+/// A file whose header and records are read, and how its points will be.
+struct Opened<'a> {
+    header: Header,
+    dimensions: Vec<Dimension>,
+    compressed: Option<Compressed<'a>>,
+    points: usize,
+    lost: u64,
+    crs: Crs,
+    origin: DVec3,
+    /// Notes before those about the points, and after them.
+    notes: [Vec<String>; 2],
+}
+
+fn open<'a>(job: &Job<'a>, shape: &Shape<'_>) -> Result<Opened<'a>, Error> {
     let mut header = Header::read(job)?;
     let records = Records::read(job.bytes, &header);
     let (mut dimensions, mut notes) = dimensions(&header, &records);
@@ -86,11 +100,6 @@ fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
         header.points = header.points.max(points as u64);
     }
     notes.extend(header.more_than_stated(compressed.as_ref().map_or(header.held, |compressed| compressed.points)));
-    let exact = job.options.exact;
-    let colors = shape.color_bytes(&header, exact);
-    let fields: usize = dimensions.iter().map(Dimension::size).sum();
-    job.check_memory(points, if exact { 24 } else { 12 } + colors + fields)?;
-
     let meaning = coordinates::of(&header, &records);
     let degrees = meaning.crs.unit == Some(Unit::Degree);
     let records_at = |i: usize| &job.bytes[header.point_data + i * header.record_len..];
@@ -102,6 +111,17 @@ fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
         }
         (None, None) => origin(&header, degrees, points, |i| header.world(records_at(i))),
     };
+    let notes = [notes, meaning.notes];
+    Ok(Opened { header, dimensions, compressed, points, lost, crs: meaning.crs, origin, notes })
+}
+
+/// Reads the points, as far as `shape` wants them.
+fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
+    let Opened { header, dimensions, compressed, points, lost, crs, origin, notes } = open(job, shape)?;
+    let exact = job.options.exact;
+    let colors = shape.color_bytes(&header, exact);
+    let fields: usize = dimensions.iter().map(Dimension::size).sum();
+    job.check_memory(points, if exact { 24 } else { 12 } + colors + fields)?;
     let mut columns = Columns::new(&header, origin, exact, dimensions, points, shape.colors)?;
     let (damaged, more) = match &compressed {
         Some(compressed) => compressed.fill(job, &mut columns)?,
@@ -114,24 +134,30 @@ fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
     columns.remove(&damaged);
     let levels = columns.levels();
     let (cloud, narrow) = columns.into_cloud()?;
+    let [mut notes, after] = notes;
     notes.extend(narrow);
     let claimed = header.points;
     if more {
         notes.push(format!("the header states {claimed} points, but the compressed data hold more; they are left out"));
     }
-    if lost > 0 {
-        notes.push(format!("the file is cut off: {lost} of {claimed} points are lost; copy it again"));
-    }
-    if !damaged.is_empty() {
-        let damaged_points: usize = damaged.iter().map(ExactSizeIterator::len).sum();
-        notes.push(format!(
-            "compressed data are damaged: {damaged_points} of {claimed} points are lost; copy the file again"
-        ));
-    }
-    notes.extend(meaning.notes);
+    notes.extend(cut_off(lost, claimed));
+    let damaged = damaged.iter().map(|range| range.len() as u64).sum::<u64>();
+    notes.extend(damage(damaged, claimed));
+    notes.extend(after);
     notes.iter().for_each(|note| job.note(note));
-    let lost = lost + damaged.iter().map(|range| range.len() as u64).sum::<u64>();
-    Ok(Decoded { cloud: cloud.with_crs(meaning.crs).with_resolution(header.scale.abs()), levels, lost })
+    let cloud = cloud.with_crs(crs).with_resolution(header.scale.abs());
+    Ok(Decoded { cloud, levels, lost: lost + damaged })
+}
+
+/// Note on points that the file ends before.
+fn cut_off(lost: u64, claimed: u64) -> Option<String> {
+    (lost > 0).then(|| format!("the file is cut off: {lost} of {claimed} points are lost; copy it again"))
+}
+
+/// Note on points that cannot be decompressed.
+fn damage(lost: u64, claimed: u64) -> Option<String> {
+    (lost > 0)
+        .then(|| format!("compressed data are damaged: {lost} of {claimed} points are lost; copy the file again"))
 }
 
 /// The number of complete records, and the number of missing ones.

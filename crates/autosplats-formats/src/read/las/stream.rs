@@ -172,6 +172,11 @@ impl Stream {
         self.runs.len()
     }
 
+    /// Number of points that a run states.
+    pub(crate) fn points(&self, run: usize) -> usize {
+        self.runs[run].points
+    }
+
     /// Reads a run, and passes on its records in pieces. Returns how many cannot be decompressed.
     ///
     /// # Errors

@@ -5,13 +5,12 @@ use std::sync::{
     atomic::{AtomicU64, Ordering},
 };
 
-use autosplats_cloud::{FieldValues, PointCloud, PointFilter};
+use autosplats_cloud::{FieldValues, PointCloud, PointFilter, lock};
 use glam::DVec3;
 
 use super::{
     frame::{Lattice, steps_of},
     schema::Schema,
-    spill::lock,
 };
 use crate::las::{self, Place};
 

@@ -12,12 +12,11 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-use autosplats_cloud::{Error, Progress};
+use autosplats_cloud::{Error, Progress, Spill, SpillCell, lock};
 
 use super::{
     frame::{Frame, morton, steps_of},
     key::Place,
-    spill::{Cell, Spill, lock},
 };
 
 /// Most bytes of records of a part, and fewest points that this may mean.
@@ -40,14 +39,14 @@ pub(super) fn most_points(record_len: usize) -> u64 {
 pub(super) struct Grid {
     root: Place,
     depth: u32,
-    pub(super) cells: Vec<Mutex<Cell>>,
+    pub(super) cells: Vec<Mutex<SpillCell>>,
 }
 
 /// A cube of the octree with few enough points.
 pub(super) struct Chunk {
     pub(super) place: Place,
     pub(super) points: u64,
-    cells: Vec<Cell>,
+    cells: Vec<SpillCell>,
 }
 
 impl Grid {
@@ -183,12 +182,12 @@ impl Joining<'_> {
         let Grid { root, depth, cells } = grid;
         // Written out, cells need no memory until they are read.
         self.spill.write_all(&cells)?;
-        let mut cells: Vec<Cell> = cells.into_iter().map(|cell| std::mem::take(&mut *lock(&cell))).collect();
+        let mut cells: Vec<SpillCell> = cells.into_iter().map(|cell| std::mem::take(&mut *lock(&cell))).collect();
         self.visit(root, depth, &mut cells)
     }
 
     /// Joins the cells of a cube that is `depth` levels above them.
-    fn visit(&mut self, place: Place, depth: u32, cells: &mut [Cell]) -> Result<(), Error> {
+    fn visit(&mut self, place: Place, depth: u32, cells: &mut [SpillCell]) -> Result<(), Error> {
         if self.progress.cancelled() {
             return Err(Error::Cancelled);
         }
@@ -207,7 +206,7 @@ impl Joining<'_> {
             }
         } else {
             let finer = Grid::below(self.frame, place, FINER);
-            let cells: Vec<Cell> = cells.iter_mut().map(std::mem::take).collect();
+            let cells: Vec<SpillCell> = cells.iter_mut().map(std::mem::take).collect();
             if finer.depth == 0 {
                 // So many points are at one place.
                 self.parts.push(Chunk { place, points, cells });

@@ -4,7 +4,7 @@
 //!
 //! The headers of the inputs tell which [records](schema) hold all that they hold, and how large the [cube](frame) of
 //! the octree is. All points become such records, which are [distributed](distribute) to cells of a grid in one
-//! [temporary file](spill). Cells are joined to parts of a fixed number of points. Each part is [built](build) in
+//! [temporary file](Spill). Cells are joined to parts of a fixed number of points. Each part is [built](build) in
 //! memory, several at a time, and its nodes are written at once. The [nodes above the parts](tops) are joined as their
 //! children come. Tables of [chunks and nodes](file) end the file.
 //!
@@ -28,7 +28,6 @@ mod sample;
 mod schema;
 mod sort;
 mod sources;
-mod spill;
 mod tops;
 
 use std::{
@@ -42,12 +41,12 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Error, Part as PartOf, PointCloud, PointFilter, Progress, free_disk, usual_memory, write_whole,
+    Error, Held, Part as PartOf, PointFilter, Progress, Spill, free_disk, lock, usual_memory, write_whole,
 };
 use glam::DVec3;
 use rayon::prelude::*;
 
-pub use self::sources::{Clouds, TreeInput};
+pub use self::sources::TreeInput;
 use self::{
     build::build,
     compress::Compressor,
@@ -56,7 +55,6 @@ use self::{
     frame::Frame,
     schema::{Holds, Schema},
     sources::{Prepared, Source},
-    spill::{Spill, lock},
     tops::Tops,
 };
 use super::Format;
@@ -169,31 +167,11 @@ fn none_inside(path: &Path, points: u64) -> Error {
     Error::unsupported(path, format!("none of the {points} points lies inside; widen --bounds"))
 }
 
-/// A cloud that is in memory.
-struct Held<'a> {
-    path: &'a Path,
-    cloud: &'a PointCloud,
-}
-
-impl Clouds for Held<'_> {
-    fn name(&self) -> &Path {
-        self.path
-    }
-
-    fn read(
-        &self,
-        _progress: &dyn Progress,
-        take: &(dyn Fn(&PointCloud) -> Result<(), Error> + Sync),
-    ) -> Result<(), Error> {
-        take(self.cloud)
-    }
-}
-
 pub(super) const FORMAT: Format = Format {
     name: "COPC",
     extensions: &["copc.laz"],
     write: |job, file| {
-        let held = Held { path: job.path, cloud: job.cloud };
+        let held = Held { name: job.path, cloud: job.whole("COPC")? };
         let options = TreeOptions { memory: usual_memory(), ..TreeOptions::default() };
         make(vec![TreeInput::Clouds(Box::new(held))], job.path, &options, job.progress, file).map(drop)
     },

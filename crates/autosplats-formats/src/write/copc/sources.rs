@@ -5,7 +5,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use autosplats_cloud::{Crs, Error, PointCloud, Progress};
+use autosplats_cloud::{Clouds, Crs, Error, PointCloud, Progress, lock};
 use rayon::prelude::*;
 
 use super::{
@@ -16,33 +16,18 @@ use super::{
     frame::{Lattice, steps_of},
     recode::Recoder,
     schema::{Holds, Schema},
-    spill::lock,
 };
 use crate::{
     las,
     read::las::{Facts, Space, Stream},
-    write::las::{Plan, Shape, Survey, finite},
+    write::{
+        job::Quiet,
+        las::{Plan, Shape, Survey, finite},
+    },
 };
 
 /// Points of a cloud that one thread encodes at a time.
 const PIECE: usize = 1 << 16;
-
-/// Points that come as clouds, one after another.
-pub trait Clouds: Sync + Send {
-    /// Name of the input.
-    fn name(&self) -> &Path;
-
-    /// Passes on all points, in clouds that have the same fields. Clouds may come from any thread. Points are asked for
-    /// several times, and are the same each time.
-    ///
-    /// # Errors
-    /// Those of `take` and of reading.
-    fn read(
-        &self,
-        progress: &dyn Progress,
-        take: &(dyn Fn(&PointCloud) -> Result<(), Error> + Sync),
-    ) -> Result<(), Error>;
-}
 
 /// What a tree is made of.
 pub enum TreeInput<'a> {
@@ -67,17 +52,6 @@ pub(super) struct Prepared<'a> {
     /// Number of points that cannot be read, and why.
     lost: Mutex<(u64, String)>,
     chosen: Chosen,
-}
-
-/// A progress that reports nothing, since points are read several times, but cancels.
-struct Quiet<'a>(&'a dyn Progress);
-
-impl Progress for Quiet<'_> {
-    fn report(&self, _fraction: f32) {}
-
-    fn cancelled(&self) -> bool {
-        self.0.cancelled()
-    }
 }
 
 impl<'a> Source<'a> {
@@ -187,20 +161,18 @@ fn read_bounds(stream: &Stream, progress: &dyn Progress) -> Result<Bounds, Error
 
 /// Reads all points for what they hold.
 fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Option<Survey>), Error> {
-    let found: Mutex<Option<(Survey, Crs)>> = Mutex::default();
-    clouds.read(progress, &|cloud| {
+    let mut found: Option<Survey> = None;
+    clouds.read(progress, &mut |cloud| {
         if cloud.is_empty() {
             return Ok(());
         }
         let own = Survey::of(cloud);
-        let mut found = lock(&found);
-        match &mut *found {
-            Some((all, _)) => all.add(own).map_err(|what| Error::unsupported(clouds.name(), what))?,
-            None => *found = Some((own, cloud.crs().clone())),
+        match &mut found {
+            Some(all) => all.add(own).map_err(|what| Error::unsupported(clouds.name(), what))?,
+            None => found = Some(own),
         }
         Ok(())
     })?;
-    let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
     let mut holds = Holds {
         name: clouds.name().to_owned(),
         points: 0,
@@ -213,15 +185,15 @@ fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Opt
         standard_time: None,
         created: None,
     };
-    let Some((survey, crs)) = found else { return Ok((holds, None)) };
+    let Some(survey) = found else { return Ok((holds, None)) };
     survey.note_losses(progress);
     let shape = Shape::of(&survey, survey.tree_format(), clouds.name(), &())?;
     holds.points = survey.points as u64;
-    (holds.colors, holds.infrared) = (survey.colored, shape.format == 8);
+    (holds.colors, holds.infrared) = (survey.is_colored(), shape.format == 8);
     holds.bounds = survey.bounds;
     holds.lattice = survey.steps.map(|scale| Lattice { scale, offset: glam::DVec3::ZERO });
     holds.extras = Extras::of(shape.record_len - las::RECORD_LEN[shape.format], &shape.descriptors);
-    (holds.crs, holds.standard_time) = (crs, survey.standard_time());
+    (holds.crs, holds.standard_time) = (survey.crs.clone(), survey.standard_time());
     Ok((holds, Some(survey)))
 }
 
@@ -257,7 +229,7 @@ impl Prepared<'_> {
                 self.chosen.only_nowhere().map_or(Ok(()), |one| take(&one))
             }
             (Source::Clouds { clouds, .. }, Some(shape)) => {
-                clouds.read(&Quiet(progress), &|cloud| self.encode(cloud, shape, progress, take))
+                clouds.read(&Quiet(progress), &mut |cloud| self.encode(cloud, shape, progress, take))
             }
             (Source::Clouds { .. }, None) => Ok(()),
         }

@@ -8,7 +8,11 @@ mod pages;
 mod values;
 mod xml;
 
-use std::{fs::File, io::BufWriter, ops::Range};
+use std::{
+    fs::File,
+    io::BufWriter,
+    ops::{Deref, Range},
+};
 
 use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, Unit, check_memory};
 use glam::{DMat3, DMat4, DVec3};
@@ -19,7 +23,7 @@ use self::{
     values::{CloudFacts, Frame, Value, values, xml_name},
     xml::ScanEntry,
 };
-use super::{Format, Job};
+use super::Format;
 
 pub(super) const FORMAT: Format = Format { name: "E57", extensions: &["e57"], write };
 
@@ -28,6 +32,20 @@ const PACKET: usize = 1 << 16;
 
 /// Packets encoded at a time.
 const BATCH: usize = 64;
+
+/// A job, and all points of it.
+struct Job<'a> {
+    job: &'a super::Job<'a>,
+    cloud: &'a PointCloud,
+}
+
+impl<'a> Deref for Job<'a> {
+    type Target = super::Job<'a>;
+
+    fn deref(&self) -> &Self::Target {
+        self.job
+    }
+}
 
 /// Points that make a scan.
 struct ScanPoints {
@@ -38,7 +56,8 @@ struct ScanPoints {
     len: usize,
 }
 
-fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
+fn write(job: &super::Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
+    let job = &Job { job, cloud: job.whole("E57")? };
     let metric = in_metres(job)?;
     let job = &Job { cloud: metric.as_ref().unwrap_or(job.cloud), ..*job };
     let known = CloudFacts::of(job.cloud);

@@ -3,7 +3,7 @@
 use autosplats_cloud::{Field, FieldValues, PointCloud};
 use glam::{DMat3, DVec3};
 
-use super::super::{Job, colors::wide_colors};
+use super::{super::colors::wide_colors, Job};
 
 /// One value of each point: name and source.
 pub(super) struct Value<'a> {

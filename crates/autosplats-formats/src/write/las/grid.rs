@@ -4,7 +4,7 @@ use autosplats_cloud::{Error, Unit};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::Job;
+use super::{super::Job, plan::finite, shape::Survey};
 
 /// Largest number of steps from the offset, slightly less than 32 bits hold.
 const MAX_STEPS: f64 = 2_147_483_600.0;
@@ -31,23 +31,20 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Finds the grid for `count` points, and notes its losses.
-    pub(super) fn of(job: &Job<'_>, count: usize, world: impl Fn(usize) -> DVec3 + Sync) -> Result<Self, Error> {
-        let cloud = job.cloud;
-        let known = cloud.resolution().filter(|step| step.is_finite() && step.cmpgt(DVec3::ZERO).all());
+    /// Finds the grid for all points, and notes its losses.
+    pub(super) fn of(job: &Job<'_>, survey: &Survey) -> Result<Self, Error> {
+        let (known, count) = (survey.resolution, survey.points);
         if count == 0 {
             return Ok(Self { scale: known.unwrap_or(DVec3::splat(COARSEST_STEP)), offset: DVec3::ZERO });
         }
-        let none = || [DVec3::INFINITY, DVec3::NEG_INFINITY];
-        let [low, high] =
-            (0..count).into_par_iter().map(|i| [world(i); 2]).reduce(none, |[a, b], [c, d]| [a.min(c), b.max(d)]);
+        let [low, high] = survey.bounds;
         let wished = known.unwrap_or_else(|| {
             let fine = |size: f64, coarsest: f64| {
                 let part = if size > 0.0 { 10_f64.powf((size * STEP_PER_SIZE).log10().floor()) } else { coarsest };
                 part.clamp(FINEST_STEP, coarsest)
             };
             let size = high - low;
-            if cloud.crs().unit == Some(Unit::Degree) {
+            if survey.crs.unit == Some(Unit::Degree) {
                 let step = fine(size.truncate().max_element(), COARSEST_STEP_DEGREES);
                 DVec3::new(step, step, fine(size.z, COARSEST_STEP))
             } else {
@@ -56,35 +53,31 @@ impl Grid {
         });
         let scale = DVec3::from_array([0, 1, 2].map(|axis| fitting(wished[axis], high[axis] - low[axis])));
         if scale != wished {
-            check_spread(job, count, &world, scale)?;
+            check_spread(job, count, scale)?;
         }
-
-        // Distances of the points from their integers along each axis: the greatest, and the sum in thousandths.
-        let off = |offset: DVec3| {
-            let miss = |i: usize| {
-                let steps = (world(i) - offset) / scale;
-                let miss = (steps - steps.round()).abs();
-                (miss, miss.to_array().map(|miss| (miss * 1000.0) as u64))
-            };
-            let join = |(most, sums): (DVec3, [u64; 3]), (other, others): (DVec3, [u64; 3])| {
-                (most.max(other), [0, 1, 2].map(|axis| sums[axis] + others[axis]))
-            };
-            (0..count).into_par_iter().map(miss).reduce(|| (DVec3::ZERO, [0; 3]), join)
-        };
         let mut offset = DVec3::from_array([0, 1, 2].map(|axis| round_offset(low[axis], high[axis], scale[axis])));
-        let (mut miss, mut sums) = off(offset);
-        for sample in (0..OFFSET_CANDIDATES).map(|sample| (count - 1) * sample / (OFFSET_CANDIDATES - 1)) {
-            if known.is_none() || miss.max_element() <= MAX_UNNOTED_STEPS {
+        if survey.steps == Some(scale) {
+            // All coordinates are multiples of the step, and so is the offset.
+            return Ok(Self { scale, offset });
+        }
+        let (mut miss, mut sums) = off(job, scale, offset)?;
+        let tried: Vec<usize> =
+            (0..OFFSET_CANDIDATES).map(|sample| (count - 1) * sample / (OFFSET_CANDIDATES - 1)).collect();
+        let mut places = Vec::new();
+        if known.is_some() && miss.max_element() > MAX_UNNOTED_STEPS {
+            places = places_of(job, &tried)?;
+        }
+        for place in places {
+            if miss.max_element() <= MAX_UNNOTED_STEPS {
                 break;
             }
             // The original offset is no multiple of its scale. Any point that was not moved since can serve as offset.
-            let place = world(sample);
             let steps = ((DVec3::midpoint(low, high) - place) / scale).round();
             let near = DVec3::from_array([0, 1, 2].map(|axis| {
                 let reached = (low[axis] - place[axis]).abs().max((high[axis] - place[axis]).abs());
                 if reached <= MAX_STEPS * scale[axis] { place[axis] } else { place[axis] + steps[axis] * scale[axis] }
             }));
-            let (most, others) = off(near);
+            let (most, others) = off(job, scale, near)?;
             for axis in 0..3 {
                 // The sum over all points decides, so that moved points do not displace the others.
                 if others[axis] < sums[axis] {
@@ -99,6 +92,46 @@ impl Grid {
         }
         Ok(Self { scale, offset })
     }
+}
+
+/// Distances of the points from their integers along each axis: the greatest, and the sum in thousandths.
+fn off(job: &Job<'_>, scale: DVec3, offset: DVec3) -> Result<(DVec3, [u64; 3]), Error> {
+    let none = (DVec3::ZERO, [0; 3]);
+    let join = |(most, sums): (DVec3, [u64; 3]), (other, others): (DVec3, [u64; 3])| {
+        (most.max(other), [0, 1, 2].map(|axis| sums[axis] + others[axis]))
+    };
+    let mut all = none;
+    job.each(&mut |cloud| {
+        let miss = |i: usize| {
+            let place = cloud.world_position(i);
+            if !place.is_finite() {
+                return none;
+            }
+            let steps = (place - offset) / scale;
+            let miss = (steps - steps.round()).abs();
+            (miss, miss.to_array().map(|miss| (miss * 1000.0) as u64))
+        };
+        all = join(all, (0..cloud.len()).into_par_iter().map(miss).reduce(|| none, join));
+        Ok(())
+    })?;
+    Ok(all)
+}
+
+/// The positions of some of the finite points; `wanted` has their numbers, which do not fall.
+fn places_of(job: &Job<'_>, wanted: &[usize]) -> Result<Vec<DVec3>, Error> {
+    let mut places = Vec::with_capacity(wanted.len());
+    let mut before = 0;
+    job.each(&mut |cloud| {
+        let kept = finite(cloud);
+        let here = kept.as_ref().map_or(cloud.len(), Vec::len);
+        while let Some(&number) = wanted.get(places.len()).filter(|&&number| number < before + here) {
+            let index = kept.as_ref().map_or(number - before, |kept| kept[number - before]);
+            places.push(cloud.world_position(index));
+        }
+        before += here;
+        Ok(())
+    })?;
+    Ok(places)
 }
 
 /// The wished step times the least power of ten with which 32 bits cover `size`.
@@ -124,8 +157,9 @@ fn round_offset(low: f64, high: f64, step: f64) -> f64 {
 }
 
 /// Fails if a few points are so far away that the step would be too coarse for all others.
-fn check_spread(job: &Job<'_>, count: usize, world: impl Fn(usize) -> DVec3, scale: DVec3) -> Result<(), Error> {
-    let sample: Vec<DVec3> = (0..count).step_by(count.div_ceil(1024).max(1)).map(world).collect();
+fn check_spread(job: &Job<'_>, count: usize, scale: DVec3) -> Result<(), Error> {
+    let wanted: Vec<usize> = (0..count).step_by(count.div_ceil(1024).max(1)).collect();
+    let sample = places_of(job, &wanted)?;
     let spread = |axis: usize| {
         let mut values: Vec<f64> = sample.iter().map(|point| point[axis]).collect();
         values.sort_by(f64::total_cmp);

@@ -7,7 +7,7 @@ use glam::DVec3;
 use laz::LazVlr;
 
 use super::{
-    plan::Plan,
+    grid::Grid,
     shape::{Shape, Survey},
 };
 use crate::las::{self, EXTRA_DESCRIPTOR, VLR_HEADER};
@@ -137,18 +137,19 @@ impl Head<'_> {
     }
 }
 
-/// Header and records of a cloud as stored in the file, and the byte at which the points begin.
+/// Header and records of points as stored in the file, and the byte at which the points begin.
 pub(super) fn bytes(
-    plan: &Plan<'_>,
     survey: &Survey,
     shape: &Shape,
+    grid: &Grid,
     totals: &Totals,
     compression: Option<&LazVlr>,
 ) -> (Vec<u8>, usize) {
-    let mut records = crs_records(plan.cloud.crs(), plan.is_wide());
+    let Shape { format, record_len, .. } = *shape;
+    let Grid { scale, offset } = *grid;
+    let mut records = crs_records(&survey.crs, las::is_wide(format));
     records.extend(extra_records(&shape.descriptors));
     records.extend(compression.map(compression_record));
-    let Plan { format, record_len, scale, offset, .. } = *plan;
     let (standard_time, created) = (survey.standard_time().unwrap_or(false), today());
     let head =
         Head { format, record_len, scale, offset, standard_time, created, totals, records: &records, extended: (0, 0) };

@@ -2,24 +2,22 @@
 
 use std::borrow::Cow;
 
-use autosplats_cloud::{Error, FieldValues, PointCloud, each_type};
+use autosplats_cloud::{FieldValues, PointCloud, each_type};
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    super::Job,
-    grid,
-    shape::{Shape, Survey, angle_steps, wide_colors},
+    super::colors::channels,
+    shape::{Shape, angle_steps},
 };
 use crate::las::{self, Place};
 
 /// How a cloud is written.
 pub(in crate::write) struct Plan<'a> {
-    pub(super) cloud: &'a PointCloud,
-    pub(super) format: usize,
-    pub(super) record_len: usize,
-    pub(super) scale: DVec3,
-    pub(super) offset: DVec3,
+    cloud: &'a PointCloud,
+    record_len: usize,
+    scale: DVec3,
+    offset: DVec3,
     /// Indices of the points that are written; `None` for all.
     kept: Option<Vec<usize>>,
     own: Vec<(Place, Cow<'a, FieldValues>)>,
@@ -40,15 +38,6 @@ struct Extra<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Makes the plan for points of this shape. Notes the losses.
-    pub(super) fn of(job: &Job<'a>, survey: &Survey, shape: &'a Shape) -> Result<Self, Error> {
-        let cloud = job.cloud;
-        let kept = finite(cloud);
-        let point = |i: usize| kept.as_ref().map_or(i, |kept| kept[i]);
-        let grid = grid::Grid::of(job, survey.points, |i| cloud.world_position(point(i)))?;
-        Ok(Self::bind(cloud, shape, grid.scale, grid.offset, kept))
-    }
-
     /// The plan of a cloud that has a shape.
     pub(in crate::write) fn bind(
         cloud: &'a PointCloud,
@@ -68,14 +57,14 @@ impl<'a> Plan<'a> {
             }
             extras.extend(column.extra.map(|at| Extra { values: &field.values, at }));
         }
-        let wide = if shape.wide { wide_colors(cloud) } else { None };
+        let wide = if shape.wide { short_channels(cloud) } else { None };
         let source = match (wide, cloud.colors()) {
             (Some(wide), _) => Some(Colors::Wide(wide)),
             (None, bytes) => bytes.map(Colors::Bytes),
         };
         let Shape { format, record_len, .. } = *shape;
         let colors = las::colors(format).zip(source);
-        Self { cloud, format, record_len, scale, offset, kept, own, colors, extras }
+        Self { cloud, record_len, scale, offset, kept, own, colors, extras }
     }
 
     /// Number of points that are written.
@@ -86,15 +75,6 @@ impl<'a> Plan<'a> {
     /// Index in the cloud of a point of the file.
     pub(in crate::write) fn point(&self, index: usize) -> usize {
         self.kept.as_ref().map_or(index, |kept| kept[index])
-    }
-
-    /// Bytes of a record beyond its point format.
-    pub(super) fn extra_len(&self) -> usize {
-        self.record_len - las::RECORD_LEN[self.format]
-    }
-
-    pub(super) fn is_wide(&self) -> bool {
-        las::is_wide(self.format)
     }
 
     /// Fills `records` completely; `point` maps a record's index to its point in the cloud.
@@ -151,4 +131,12 @@ pub(in crate::write) fn finite(cloud: &PointCloud) -> Option<Vec<usize>> {
     let finite = |i: &usize| cloud.world_position(*i).is_finite();
     let all = (0..cloud.len()).into_par_iter().all(|i| finite(&i));
     (!all).then(|| (0..cloud.len()).into_par_iter().filter(finite).collect())
+}
+
+/// The 16-bit colour fields.
+fn short_channels(cloud: &PointCloud) -> Option<[&[u16]; 3]> {
+    match channels(cloud)? {
+        [FieldValues::U16(red), FieldValues::U16(green), FieldValues::U16(blue)] => Some([red, green, blue]),
+        _ => None,
+    }
 }

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, Progress, each_type, one_line, printable};
+use autosplats_cloud::{Axes, Crs, Error, FieldValues, PointCloud, Progress, each_type, one_line, printable};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::colors;
+use super::super::colors::{self, WideColors};
 use crate::las::{self, ANGLE_STEP, EXTRA_DESCRIPTOR, Place};
 
 /// 2⁵³: up to it, `f64` holds all integers.
@@ -30,10 +30,14 @@ pub(in crate::write) struct Survey {
     /// Steps of which all coordinates are multiples, if the clouds state them.
     pub(in crate::write) steps: Option<DVec3>,
     pub(super) fields: Vec<Surveyed>,
-    pub(in crate::write) colored: bool,
-    wide: bool,
+    /// Whether there are colours of 8 bits, and what is known of those of 16.
+    colored: bool,
+    wide: Option<WideColors>,
     sensors: bool,
     axes: Option<Axes>,
+    /// The step that the clouds state.
+    pub(super) resolution: Option<DVec3>,
+    pub(in crate::write) crs: Crs,
     standard_time: bool,
 }
 
@@ -62,28 +66,27 @@ impl Survey {
             let miss = |place: DVec3| (place / *steps - (place / *steps).round()).abs().max_element();
             (0..cloud.len()).into_par_iter().map(|i| cloud.world_position(i)).all(|place| !(miss(place) > MAX_MISS))
         };
-        let steps = cloud.resolution().filter(positive).filter(is_multiple);
-        let wide = wide_colors(cloud).is_some();
-        let is_color = |name: &str| wide && colors::CHANNELS.contains(&name);
-        let fields = cloud.fields().iter().filter(|field| !is_color(&field.name));
-        let fields: Vec<Surveyed> = fields
-            .map(|field| Surveyed {
-                name: field.name.clone(),
-                kind: data_type(&field.values),
-                range: ValueRange::of(&field.values),
-                rounds: angles_are_rounded(&field.values),
-            })
-            .collect();
+        let resolution = cloud.resolution().filter(positive);
+        let steps = resolution.filter(is_multiple);
+        let fields = cloud.fields().iter().map(|field| Surveyed {
+            name: field.name.clone(),
+            kind: data_type(&field.values),
+            range: ValueRange::of(&field.values),
+            rounds: angles_are_rounded(&field.values),
+        });
+        let fields: Vec<Surveyed> = fields.collect();
         let time = fields.iter().find(|field| field.name.eq_ignore_ascii_case("GpsTime"));
         Self {
             points,
             dropped: cloud.len() - points,
             bounds,
             steps,
-            colored: wide || cloud.colors().is_some(),
-            wide,
+            colored: cloud.colors().is_some(),
+            wide: WideColors::of(cloud).filter(WideColors::are_short),
             sensors: !cloud.scans().is_empty(),
             axes: cloud.axes(),
+            resolution,
+            crs: cloud.crs().clone(),
             standard_time: time.is_some_and(|time| time.range.high.max(-time.range.low) > WEEK),
             fields,
         }
@@ -93,12 +96,14 @@ impl Survey {
     pub(in crate::write) fn add(&mut self, other: Self) -> Result<(), String> {
         let same = |(a, b): (&Surveyed, &Surveyed)| (&a.name, a.kind) == (&b.name, b.kind);
         let fields = self.fields.len() == other.fields.len() && self.fields.iter().zip(&other.fields).all(same);
-        if !fields || (self.colored, self.wide) != (other.colored, other.wide) {
+        if !fields || self.colored != other.colored {
             return Err("its points do not all have the same values; it cannot be read in parts".into());
         }
         self.points += other.points;
         self.dropped += other.dropped;
         self.steps = self.steps.filter(|_| self.steps == other.steps);
+        self.resolution = self.resolution.filter(|_| self.resolution == other.resolution);
+        self.wide = self.wide.zip(other.wide).map(|(wide, other)| wide.and(other));
         self.bounds = [self.bounds[0].min(other.bounds[0]), self.bounds[1].max(other.bounds[1])];
         for (own, other) in self.fields.iter_mut().zip(other.fields) {
             own.range = own.range.and(other.range);
@@ -107,6 +112,21 @@ impl Survey {
         self.sensors |= other.sensors;
         self.standard_time |= other.standard_time;
         Ok(())
+    }
+
+    /// Whether the colours come from fields of 16 bits.
+    fn is_wide(&self) -> bool {
+        self.wide.is_some_and(|wide| wide.are_colors())
+    }
+
+    pub(in crate::write) fn is_colored(&self) -> bool {
+        self.colored || self.is_wide()
+    }
+
+    /// The fields that are no colours.
+    fn values(&self) -> impl Iterator<Item = &Surveyed> {
+        let is_wide = self.is_wide();
+        self.fields.iter().filter(move |field| !(is_wide && colors::CHANNELS.contains(&&*field.name)))
     }
 
     /// Notes what LAS cannot hold, whatever its format.
@@ -130,7 +150,7 @@ impl Survey {
             let place = Place::U16(36);
             field.name.eq_ignore_ascii_case("Infrared") && !field.range.is_zero() && field.range.fits(place)
         };
-        match (self.colored, self.fields.iter().any(infrared)) {
+        match (self.is_colored(), self.fields.iter().any(infrared)) {
             (_, true) => 8,
             (true, false) => 7,
             (false, false) => 6,
@@ -181,7 +201,7 @@ impl Shape {
         let mut columns = Vec::new();
         let mut descriptors: Vec<[u8; EXTRA_DESCRIPTOR]> = Vec::new();
         let mut record_len = las::RECORD_LEN[format];
-        for Surveyed { name, kind, range, rounds } in &survey.fields {
+        for Surveyed { name, kind, range, rounds } in survey.values() {
             let place = places.iter().find(|(known, _)| name.eq_ignore_ascii_case(known)).map(|&(_, place)| place);
             let mut column = Column { name: name.clone(), place: None, extra: None };
             match place {
@@ -223,7 +243,7 @@ impl Shape {
             let what = format!("a point would take {record_len} bytes; LAS allows {MAX_RECORD}; write PLY instead");
             return Err(Error::Unsupported { path: path.into(), what });
         }
-        Ok(Self { format, record_len, wide: survey.wide, columns, descriptors })
+        Ok(Self { format, record_len, wide: survey.is_wide(), columns, descriptors })
     }
 }
 
@@ -322,7 +342,7 @@ fn is_known(name: &str) -> bool {
 
 /// The point format: of LAS 1.2, unless some value needs LAS 1.4.
 pub(super) fn choose(survey: &Survey) -> usize {
-    let Survey { fields, colored, points: count, .. } = survey;
+    let (colored, count) = (survey.is_colored(), survey.points);
     let needs_wide = |field: &Surveyed| {
         let range = field.range;
         let find =
@@ -334,15 +354,15 @@ pub(super) fn choose(survey: &Survey) -> usize {
         let fits_narrow = fits(3) && !(many && range.high > 5.0);
         !range.is_zero() && !fits_narrow && fits(8)
     };
-    let has = |name: &str| fields.iter().any(|field| field.name.eq_ignore_ascii_case(name) && !field.range.is_zero());
-    if *count as u64 > u64::from(u32::MAX) || fields.iter().any(needs_wide) {
-        match (*colored, has("Infrared")) {
+    let has = |name: &str| survey.values().any(|field| field.name.eq_ignore_ascii_case(name) && !field.range.is_zero());
+    if count as u64 > u64::from(u32::MAX) || survey.values().any(needs_wide) {
+        match (colored, has("Infrared")) {
             (_, true) => 8,
             (true, false) => 7,
             (false, false) => 6,
         }
     } else {
-        match (has("GpsTime"), *colored) {
+        match (has("GpsTime"), colored) {
             (false, false) => 0,
             (true, false) => 1,
             (false, true) => 2,
@@ -394,12 +414,4 @@ fn name_of(raw: &[u8; EXTRA_DESCRIPTOR]) -> String {
 /// A name for display in a message.
 fn shown(name: &str) -> String {
     printable(&name.chars().take(60).collect::<String>())
-}
-
-/// The 16-bit colour fields.
-pub(super) fn wide_colors(cloud: &PointCloud) -> Option<[&[u16]; 3]> {
-    match colors::wide_colors(cloud)? {
-        [FieldValues::U16(red), FieldValues::U16(green), FieldValues::U16(blue)] => Some([red, green, blue]),
-        _ => None,
-    }
 }

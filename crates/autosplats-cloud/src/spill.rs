@@ -15,17 +15,40 @@ use std::{
     },
 };
 
-use autosplats_cloud::{Error, read_exact_at, temporary_unnamed, write_all_at};
+use crate::{
+    Error,
+    files::{read_exact_at, temporary_unnamed, write_all_at},
+};
 
 /// Bytes of a slot: large ones are read fast, small ones let many cells gather records.
 const LARGEST_SLOT: usize = 256 << 10;
 const SMALLEST_SLOT: usize = 4 << 10;
 
-/// The temporary file.
-pub(super) struct Spill {
+/// The temporary file, and how much is gathered.
+///
+/// # Examples
+///
+/// ```
+/// use std::sync::Mutex;
+///
+/// use autosplats_cloud::{Spill, SpillCell};
+///
+/// # let folder = tempfile::tempdir()?;
+/// let cells: [Mutex<SpillCell>; 2] = Default::default();
+/// let spill = Spill::new(folder.path(), 4, cells.len(), 1 << 20)?;
+/// spill.append(&cells, 1, &[1, 2, 3, 4])?;
+/// spill.append(&cells, 1, &[5, 6, 7, 8])?;
+/// let mut found = Vec::new();
+/// let [_, second] = cells.map(|cell| cell.into_inner().unwrap_or_default());
+/// spill.take(second, |records| Ok(found.extend_from_slice(records)))?;
+/// assert_eq!(found, [1, 2, 3, 4, 5, 6, 7, 8]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Spill {
     folder: PathBuf,
     file: File,
-    pub(super) record_len: usize,
+    /// Bytes of a record.
+    pub record_len: usize,
     /// Bytes of a slot, a multiple of the record's.
     slot: usize,
     /// Bytes that all cells together may gather, and that they hold.
@@ -45,18 +68,21 @@ struct Slots {
 }
 
 /// Records of one place.
-#[derive(Default)]
-pub(super) struct Cell {
+#[derive(Debug, Default)]
+pub struct SpillCell {
     gathered: Vec<u8>,
     /// Slots on the disk, each with its number of bytes.
     slots: Vec<(u32, u32)>,
     /// Number of records.
-    pub(super) count: u64,
+    pub count: u64,
 }
 
 impl Spill {
     /// Makes a file in `folder` for records of `record_len` bytes, which up to `cells` cells gather in `budget` bytes.
-    pub(super) fn new(folder: &Path, record_len: usize, cells: usize, budget: usize) -> Result<Self, Error> {
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn new(folder: &Path, record_len: usize, cells: usize, budget: usize) -> Result<Self, Error> {
         let wished = (budget / cells.max(1)).clamp(SMALLEST_SLOT, LARGEST_SLOT);
         let slot = (wished / record_len).max(1) * record_len;
         let file = temporary_unnamed(folder).map_err(|source| Error::Io { path: folder.into(), source })?;
@@ -70,8 +96,11 @@ impl Spill {
         Error::Io { path: self.folder.clone(), source }
     }
 
-    /// Adds records to one of the cells.
-    pub(super) fn append(&self, cells: &[Mutex<Cell>], index: usize, mut records: &[u8]) -> Result<(), Error> {
+    /// Adds records to one of the cells, from any thread.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn append(&self, cells: &[Mutex<SpillCell>], index: usize, mut records: &[u8]) -> Result<(), Error> {
         let mut cell = lock(&cells[index]);
         cell.count += (records.len() / self.record_len) as u64;
         while !records.is_empty() {
@@ -94,7 +123,10 @@ impl Spill {
     }
 
     /// Writes what the cells have gathered, but for cells that are in use.
-    pub(super) fn write_all(&self, cells: &[Mutex<Cell>]) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_all(&self, cells: &[Mutex<SpillCell>]) -> Result<(), Error> {
         for cell in cells {
             let Ok(mut cell) = cell.try_lock() else { continue };
             if !cell.gathered.is_empty() {
@@ -108,7 +140,7 @@ impl Spill {
         Ok(())
     }
 
-    fn write(&self, cell: &mut Cell) -> Result<(), Error> {
+    fn write(&self, cell: &mut SpillCell) -> Result<(), Error> {
         let slot = {
             let mut slots = lock(&self.slots);
             slots.free.pop().unwrap_or_else(|| {
@@ -127,28 +159,42 @@ impl Spill {
     }
 
     /// Takes the records out of a cell, a slot at a time.
-    pub(super) fn take(&self, cell: Cell, mut each: impl FnMut(&[u8]) -> Result<(), Error>) -> Result<(), Error> {
-        let Cell { gathered, slots, .. } = cell;
-        let mut bytes = vec![0; if slots.is_empty() { 0 } else { self.slot }];
-        for (slot, len) in slots {
-            let bytes = &mut bytes[..len as usize];
-            read_exact_at(&self.file, bytes, u64::from(slot) * self.slot as u64).map_err(|source| self.io(source))?;
-            lock(&self.slots).free.push(slot);
-            self.stored.fetch_sub(u64::from(len), Ordering::Relaxed);
-            each(bytes)?;
-        }
+    ///
+    /// # Errors
+    /// [`Error::Io`] and those of `each`.
+    pub fn take(&self, cell: SpillCell, each: impl FnMut(&[u8]) -> Result<(), Error>) -> Result<(), Error> {
+        self.visit(&cell, each)?;
+        let SpillCell { gathered, slots, .. } = cell;
+        let len: u64 = slots.iter().map(|&(_, len)| u64::from(len)).sum();
+        lock(&self.slots).free.extend(slots.iter().map(|&(slot, _)| slot));
+        self.stored.fetch_sub(len, Ordering::Relaxed);
         if gathered.capacity() > 0 {
             self.gathered.fetch_sub(self.slot, Ordering::Relaxed);
         }
-        if gathered.is_empty() { Ok(()) } else { each(&gathered) }
+        Ok(())
+    }
+
+    /// Reads the records of a cell, a slot at a time, and leaves them there.
+    ///
+    /// # Errors
+    /// [`Error::Io`] and those of `each`.
+    pub fn visit(&self, cell: &SpillCell, mut each: impl FnMut(&[u8]) -> Result<(), Error>) -> Result<(), Error> {
+        let mut bytes = vec![0; if cell.slots.is_empty() { 0 } else { self.slot }];
+        for &(slot, len) in &cell.slots {
+            let bytes = &mut bytes[..len as usize];
+            read_exact_at(&self.file, bytes, u64::from(slot) * self.slot as u64).map_err(|source| self.io(source))?;
+            each(bytes)?;
+        }
+        if cell.gathered.is_empty() { Ok(()) } else { each(&cell.gathered) }
     }
 
     /// Most bytes of records that were on the disk at once. Slots that are not full leave holes, which take no room.
-    pub(super) fn bytes(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         self.most.load(Ordering::Relaxed)
     }
 }
 
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+/// Locks, whether or not another thread has panicked.
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,0 +1,77 @@
+//! Points that come in parts, since memory need not hold them all.
+
+use std::path::Path;
+
+use crate::{Error, PointCloud, Progress};
+
+/// Points that come as clouds, one after another. Whoever works on them needs memory for a cloud, and not for all.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{Clouds, Held, PointCloud, glam::DVec3};
+///
+/// let cloud = PointCloud::new(DVec3::ZERO, vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+/// let mut high = 0.0_f64;
+/// Held { name: "memory".as_ref(), cloud: &cloud }.read(&(), &mut |part| {
+///     high = (0..part.len()).map(|i| part.world_position(i).z).fold(high, f64::max);
+///     Ok(())
+/// })?;
+/// assert_eq!(high, 6.0);
+/// # Ok::<(), autosplats_cloud::Error>(())
+/// ```
+pub trait Clouds: Sync + Send {
+    /// Name of the input.
+    fn name(&self) -> &Path;
+
+    /// Number of points, if it is known before they are read.
+    fn points(&self) -> Option<u64> {
+        None
+    }
+
+    /// All points, if memory holds them anyway.
+    fn whole(&self) -> Option<&PointCloud> {
+        None
+    }
+
+    /// Passes on all points in the input's order, in clouds that have the same fields. Points may be asked for several
+    /// times, and are the same each time.
+    ///
+    /// # Errors
+    /// Those of `take` and of reading.
+    fn read(
+        &self,
+        progress: &dyn Progress,
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
+    ) -> Result<(), Error>;
+}
+
+/// A cloud that is in memory.
+pub struct Held<'a> {
+    /// Name of the input.
+    pub name: &'a Path,
+    /// The points.
+    pub cloud: &'a PointCloud,
+}
+
+impl Clouds for Held<'_> {
+    fn name(&self) -> &Path {
+        self.name
+    }
+
+    fn points(&self) -> Option<u64> {
+        Some(self.cloud.len() as u64)
+    }
+
+    fn whole(&self) -> Option<&PointCloud> {
+        Some(self.cloud)
+    }
+
+    fn read(
+        &self,
+        _progress: &dyn Progress,
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        take(self.cloud)
+    }
+}
