@@ -19,6 +19,7 @@ mod interrupt;
 mod normals;
 mod output;
 mod pages;
+mod parts;
 mod progress;
 mod render;
 mod threads;

@@ -1,27 +1,44 @@
 //! `autosplats normals`: estimates the normal, curvature and density of every point and writes them to a file.
 
 use std::borrow::Cow;
+use std::path::Path;
 
 use autosplats::cloud::glam::DVec3;
-use autosplats::{NormalSettings, Normals, Orientation, estimate_normals};
-use autosplats_cloud::{FieldValues, PointCloud, Unit, check_memory};
+use autosplats::{
+    NormalSettings, Normals, NormalsInParts, Orientation, PartsOptions, Viewpoint, estimate_normals,
+    estimate_normals_in_parts,
+};
+use autosplats_cloud::{
+    Axes, Clouds, FieldValues, LocalMetres, PointCloud, Progress, Thinned, Thinning, Unit, check_memory,
+};
 
 use crate::args::NormalsArgs;
 use crate::choices::OrientChoice;
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
-use crate::output::{check_cloud_target, write_cloud};
+use crate::output::{check_cloud_target, write_cloud, write_parts};
+use crate::parts::{Need, Parts, WorkError, parts};
 use crate::progress::Bar;
 
 /// Bytes per point beside the cloud: the search tree and the result.
 const BYTES_PER_POINT: u64 = 40;
 
+/// Bytes per point of a cloud with all its values and digits.
+const CLOUD_BYTES: u64 = 100;
+
+/// Bytes per point that wait on the disk beside the points: positions, and results in two orders.
+const DISK_BYTES: u64 = 64;
+
+/// Of so many points one is looked at for the middle of all.
+const SAMPLE_STEP: usize = 256;
+
+const TO_GIVEN: &str = "to the given sensor";
+
 /// Reads the inputs, estimates, and writes the file.
 pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> {
-    let NormalsArgs { paths, input, force, k, orient, sensor, part, run: _ } = args;
+    let NormalsArgs { paths, input, force, k, orient, sensor, part, room, run: _ } = args;
     let (inputs, output) = Inputs::with_output(paths, None, input)?;
-    inputs.check_memory()?;
     if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pts")) {
         return Err(Failure::usage(format!(
             "{}: PTS cannot hold normals; write .xyz, .ply or another format",
@@ -29,6 +46,11 @@ pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> 
         )));
     }
     check_cloud_target(&output, *force, &inputs.files([]), console)?;
+    let need = Need { what: "the work", memory: BYTES_PER_POINT + CLOUD_BYTES, disk: DISK_BYTES };
+    if let Some(parts) = parts(&inputs, room, part, &output, &need, console)? {
+        return in_parts(args, &parts, &output, console);
+    }
+    inputs.check_memory()?;
     let (cloud, read) = inputs.read_part(part, console)?;
     if cloud.is_empty() {
         return Err(Failure::new(Exit::Input, format!("none of the {read} points lies inside; widen --bounds")));
@@ -50,15 +72,169 @@ pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> 
     Ok(())
 }
 
+/// Estimates and writes the normals of points that memory does not hold.
+fn in_parts(args: &NormalsArgs, parts: &Parts, output: &Path, console: &Console) -> Result<(), Failure> {
+    let failed = |error: WorkError| parts.failure(error, output);
+    let thinning = Thinning { bounds: args.part.bounds, ..Thinning::default() };
+    let thinned = Thinned::new(&parts.clouds, thinning, &parts.folder, parts.memory, &());
+    let thinned = thinned.map_err(|error| failed(error.into()))?;
+    let overview = Overview::of(&thinned).map_err(|error| failed(error.into()))?;
+    let (orientation, towards) = overview.orientation(args.orient, args.sensor)?;
+    let local = InMetres { clouds: &thinned, map: overview.sample.local_metres(None) };
+    let settings = NormalSettings { k: args.k, orientation };
+    let options = PartsOptions { memory: parts.memory, folder: parts.folder.clone() };
+    let bar = Bar::new("estimating normals", console);
+    let writing = console.interrupt().writing();
+    let normals = estimate_normals_in_parts(&local, &settings, &options, &bar).map_err(|error| failed(error.into()))?;
+    drop((writing, bar));
+    let (points, tiles, in_doubt) = (normals.len(), normals.tiles(), normals.in_doubt());
+    let bytes = write_parts(&WithNormals { clouds: &thinned, normals }, output, parts, console)?;
+    if in_doubt > 0 {
+        console.note(format_args!(
+            "{in_doubt} points may have nearer neighbours than the memory held at once; allow more with --memory"
+        ));
+    }
+    let shown = output.display();
+    console.tell(format_args!(
+        "{shown}: normals of {points} points, pointing {towards}, in {tiles} parts, {in_doubt} in doubt; {bytes} bytes"
+    ));
+    Ok(())
+}
+
+/// What orientation depends on, of points that come in parts.
+struct Overview {
+    /// Every so many points, and the corners of their box.
+    sample: PointCloud,
+    corners: PointCloud,
+    viewpoints: Vec<Viewpoint>,
+    points: u64,
+}
+
+impl Overview {
+    fn of(clouds: &dyn Clouds) -> Result<Self, autosplats_cloud::Error> {
+        let (mut parts, mut viewpoints, mut points) = (Vec::new(), Vec::new(), 0);
+        let mut ends: Option<PointCloud> = None;
+        clouds.read(&(), &mut |cloud| {
+            viewpoints.extend(cloud.scans().iter().map(|scan| Viewpoint {
+                position: scan.position(),
+                points: scan.points.start + points as usize..scan.points.end + points as usize,
+            }));
+            points += cloud.len() as u64;
+            let finite = cloud.positions().iter().filter(|place| place.iter().all(|value| value.is_finite()));
+            let none = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+            let [low, high] = finite.fold(none, |[low, high], place| {
+                let join = |ends: [f32; 3], pick: fn(f32, f32) -> f32| [0, 1, 2].map(|axis| pick(ends[axis], place[axis]));
+                [join(low, f32::min), join(high, f32::max)]
+            });
+            let corners = PointCloud::new(cloud.origin(), vec![low, high]);
+            let corners = cloud.axes().map_or(corners.clone(), |axes| corners.with_axes(axes));
+            match &mut ends {
+                None => ends = Some(corners),
+                Some(ends) => ends.append(corners),
+            }
+            let mut few = cloud.clone();
+            few.keep_every(SAMPLE_STEP);
+            few.retain_fields(|_| false);
+            parts.push(few);
+            Ok(())
+        })?;
+        Ok(Self { sample: PointCloud::joined(parts.iter()), corners: ends.unwrap_or_default(), viewpoints, points })
+    }
+
+    /// As of a cloud that is in memory.
+    fn orientation(
+        &self,
+        choice: OrientChoice,
+        sensor: Option<DVec3>,
+    ) -> Result<(Orientation, &'static str), Failure> {
+        let all = |position: DVec3| Orientation::Viewpoints(vec![Viewpoint { position, points: 0..self.points as usize }]);
+        if let Some(position) = sensor {
+            return Ok((all(position), TO_GIVEN));
+        }
+        let sensors = match choice {
+            OrientChoice::Auto | OrientChoice::Sensor if !self.viewpoints.is_empty() => {
+                Some(Orientation::Viewpoints(self.viewpoints.clone()))
+            }
+            OrientChoice::Auto | OrientChoice::Sensor if self.corners.axes() == Some(Axes::Camera) => {
+                Some(all(DVec3::ZERO))
+            }
+            _ => None,
+        };
+        match sensors {
+            Some(orientation) => Ok((orientation, "to the sensor")),
+            None => orientation(&self.corners, choice, None),
+        }
+    }
+}
+
+/// Points in metres on the ground, if they are in degrees.
+struct InMetres<'a> {
+    clouds: &'a dyn Clouds,
+    map: Option<LocalMetres>,
+}
+
+impl Clouds for InMetres<'_> {
+    fn name(&self) -> &Path {
+        self.clouds.name()
+    }
+
+    fn points(&self) -> Option<u64> {
+        self.clouds.points()
+    }
+
+    fn read(
+        &self,
+        progress: &dyn Progress,
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), autosplats_cloud::Error>,
+    ) -> Result<(), autosplats_cloud::Error> {
+        let Some(map) = &self.map else { return self.clouds.read(progress, take) };
+        self.clouds.read(progress, &mut |cloud| {
+            let mut cloud = cloud.clone();
+            cloud.to_metres_on(map);
+            take(&cloud)
+        })
+    }
+}
+
+/// Points with their normals.
+struct WithNormals<'a> {
+    clouds: &'a dyn Clouds,
+    normals: NormalsInParts,
+}
+
+impl Clouds for WithNormals<'_> {
+    fn name(&self) -> &Path {
+        self.clouds.name()
+    }
+
+    fn points(&self) -> Option<u64> {
+        Some(self.normals.len())
+    }
+
+    fn read(
+        &self,
+        progress: &dyn Progress,
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), autosplats_cloud::Error>,
+    ) -> Result<(), autosplats_cloud::Error> {
+        let mut done = 0;
+        self.clouds.read(progress, &mut |cloud| {
+            let end = done + cloud.len() as u64;
+            let normals = self.normals.read(done..end)?;
+            done = end;
+            take(&with_normals(cloud.clone(), normals)?)
+        })
+    }
+}
+
 /// Adds the result as fields, replacing existing ones.
-fn with_normals(cloud: PointCloud, normals: Normals) -> Result<PointCloud, Failure> {
+fn with_normals(cloud: PointCloud, normals: Normals) -> Result<PointCloud, autosplats_cloud::Error> {
     let Normals { normals, curvature, radius } = normals;
     let axis = |axis: usize| FieldValues::F32(normals.iter().map(|normal| normal[axis]).collect());
     let fields = [("NormalX", axis(0)), ("NormalY", axis(1)), ("NormalZ", axis(2))];
     let fields = fields
         .into_iter()
         .chain([("Curvature", FieldValues::F32(curvature)), ("DensityRadius", FieldValues::F32(radius))]);
-    Ok(fields.into_iter().try_fold(cloud, |cloud, (name, values)| cloud.with_field(name, values))?)
+    fields.into_iter().try_fold(cloud, |cloud, (name, values)| cloud.with_field(name, values))
 }
 
 /// Orientation of the normals, and its name for the summary.
@@ -68,7 +244,7 @@ fn orientation(
     sensor: Option<DVec3>,
 ) -> Result<(Orientation, &'static str), Failure> {
     if let Some(position) = sensor {
-        return Ok((Orientation::towards(position, cloud), "to the given sensor"));
+        return Ok((Orientation::towards(position, cloud), TO_GIVEN));
     }
     let orientation = match choice {
         OrientChoice::Auto => Orientation::usual(cloud),

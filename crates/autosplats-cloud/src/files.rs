@@ -8,6 +8,8 @@ use std::{
     path::Path,
 };
 
+use crate::Error;
+
 /// The content of a file: mapped, or read if the file cannot be mapped, such as a pipe.
 pub enum Bytes {
     /// A map of the file.
@@ -123,6 +125,20 @@ pub fn free_disk(folder: &Path) -> Option<u64> {
         let _ = folder;
         None
     }
+}
+
+/// Fails if the disk of a folder has less room than `bytes` for temporary files, which `what` needs.
+///
+/// # Errors
+/// [`Error::Io`], which tells what is needed and what is there.
+pub fn check_disk(folder: &Path, bytes: u64, what: &str) -> Result<(), Error> {
+    let Some(free) = free_disk(folder).filter(|&free| free < bytes) else { return Ok(()) };
+    let [need, free] = [bytes, free].map(|bytes| bytes.div_ceil(1 << 20));
+    let what = format!(
+        "{what} takes {need} MiB of disk for a while, but only {free} MiB are free; name another folder for temporary \
+         files"
+    );
+    Err(Error::Io { path: folder.into(), source: std::io::Error::new(std::io::ErrorKind::StorageFull, what) })
 }
 
 /// Reads the bytes of a file from byte `at` on, whatever other threads read.

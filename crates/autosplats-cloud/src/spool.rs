@@ -6,7 +6,7 @@ use std::{
 };
 
 use crate::{
-    Clouds, Error, Field, FieldValues, PointCloud, Progress, Scan, each_type,
+    Clouds, Crs, Error, Field, FieldValues, PointCloud, Progress, Scan, each_type,
     files::{read_exact_at, temporary_unnamed, write_all_at},
 };
 
@@ -63,6 +63,11 @@ impl Spool {
         };
         clouds.read(progress, &mut |cloud| spool.add(cloud))?;
         Ok(spool)
+    }
+
+    /// The coordinate system.
+    pub fn crs(&self) -> &Crs {
+        &self.like.crs
     }
 
     fn add(&mut self, cloud: &PointCloud) -> Result<(), Error> {

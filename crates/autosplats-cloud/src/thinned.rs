@@ -88,14 +88,15 @@ impl<'a> Thinned<'a> {
         self.kept.load(Ordering::Relaxed)
     }
 
-    /// Passes on what cropping and counting leave, with the number of points before.
+    /// Passes on what cropping and counting leave, with the number of points before. Returns the number of all points.
     fn coarse(
         &self,
         progress: &dyn Progress,
         take: &mut dyn FnMut(PointCloud, u64) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        let (mut inside, mut left) = (0, 0);
+    ) -> Result<u64, Error> {
+        let (mut all, mut inside, mut left) = (0, 0, 0);
         self.clouds.read(progress, &mut |cloud| {
+            all += cloud.len() as u64;
             let mut cloud = cloud.clone();
             if let Some([min, max]) = self.thinning.bounds {
                 cloud.crop(min, max);
@@ -108,7 +109,8 @@ impl<'a> Thinned<'a> {
             let before = left;
             left += cloud.len() as u64;
             take(cloud, before)
-        })
+        })?;
+        Ok(all)
     }
 
     /// Chooses one point of each cube. A cube's points are all in one part of the file, whatever their order.
@@ -192,7 +194,7 @@ impl Clouds for Thinned<'_> {
         take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut kept = 0;
-        self.coarse(progress, &mut |mut cloud, before| {
+        let all = self.coarse(progress, &mut |mut cloud, before| {
             if let Some(chosen) = &self.chosen {
                 cloud.retain(|i| {
                     let number = before + i as u64;
@@ -206,6 +208,10 @@ impl Clouds for Thinned<'_> {
             take(&cloud)
         })?;
         self.kept.store(kept, Ordering::Relaxed);
+        if kept == 0 && all > 0 && self.thinning.bounds.is_some() {
+            let what = format!("none of the {all} points lies inside; widen --bounds");
+            return Err(Error::unsupported(self.name(), what));
+        }
         Ok(())
     }
 }

@@ -23,6 +23,7 @@ Examples:
   autosplats convert scene:herd:10M herd.ply
   autosplats convert bun000.ply bun045.ply all.ply --pose bun045.ply=bun045.txt
   autosplats convert tiles/*.laz -o city.copc.laz --memory 4G --temp /scratch
+  autosplats convert city.copc.laz thin.laz --voxel 0.1 --memory 1G
 
 A name that ends in .copc.laz makes an octree. About as much disk as the uncompressed points take is used for a while.
 LAS, LAZ, COPC and scenes may be larger than memory; other inputs are read whole, one at a time.";
@@ -41,18 +42,27 @@ pub(crate) struct ConvertArgs {
     /// Replace an existing file
     #[arg(long, help_heading = "Running")]
     pub(crate) force: bool,
-    /// Memory for making an octree (.copc.laz), such as 500M [default: a quarter of what is free, at most 2G]
-    #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true, help_heading = "Running")]
-    pub(crate) memory: Option<u64>,
-    /// Folder for the temporary file of making an octree [default: that of the output]
-    #[arg(long, value_name = "FOLDER", help_heading = "Running")]
-    pub(crate) temp: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) room: RoomArgs,
     #[command(flatten)]
     pub(crate) part: PartArgs,
     #[command(flatten)]
     pub(crate) thinning: ThinningArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+/// Memory and disk for points that are worked on in parts.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Running")]
+pub(crate) struct RoomArgs {
+    /// Memory for points, such as 500M. A LAS, LAZ or COPC file or a scene with more points is worked on in parts
+    /// [default: what is free; for octrees a quarter of it, at most 2G]
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
+    pub(crate) memory: Option<u64>,
+    /// Folder for temporary files of work in parts [default: that of the output]
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) temp: Option<PathBuf>,
 }
 
 /// The part of the inputs that is read.
@@ -98,6 +108,7 @@ Examples:
   autosplats normals scan.e57 normals.ply
   autosplats normals survey.laz normals.laz -k 20 --orient up
   autosplats normals sweep.bin normals.ply --sensor 0,0,1.8
+  autosplats normals huge.laz normals.laz --memory 2G --temp /scratch
 
 The file keeps all attributes of the input and adds:
   NormalX NormalY NormalZ  unit normal (nx ny nz in PLY)
@@ -126,6 +137,8 @@ pub(crate) struct NormalsArgs {
     /// Replace an existing file
     #[arg(long, help_heading = "Running")]
     pub(crate) force: bool,
+    #[command(flatten)]
+    pub(crate) room: RoomArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }

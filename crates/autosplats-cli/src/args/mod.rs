@@ -11,7 +11,7 @@ mod view;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::bench::{BenchArgs, Evaluation, PaperArgs};
-pub(crate) use self::clouds::{ConvertArgs, InfoArgs, NormalsArgs, PartArgs, ThinningArgs};
+pub(crate) use self::clouds::{ConvertArgs, InfoArgs, NormalsArgs, PartArgs, RoomArgs, ThinningArgs};
 pub(crate) use self::input::{InputArgs, PlayingArgs, ReadingArgs, TreeArgs};
 pub(crate) use self::others::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, TopicsArgs};
 pub(crate) use self::picture::{CameraArgs, LookArgs, NeighborArgs, SurfaceArgs};

@@ -2,14 +2,23 @@
 
 mod tree;
 
-use autosplats_cloud::{PointCloud, Unit};
+use std::path::Path;
+
+use autosplats_cloud::{Crs, PointCloud, Thinned, Thinning, Unit};
 
 use crate::args::{ConvertArgs, ThinningArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
-use crate::output::{check_cloud_target, write_cloud};
+use crate::output::{check_cloud_target, write_cloud, write_parts};
+use crate::parts::{Need, Parts, parts};
 use crate::progress::Bar;
+
+/// Bytes per point that all points at once need: all their values, with all digits, and what writing takes.
+const BYTES_PER_POINT: u64 = 100;
+
+/// Bytes per point that wait on the disk while points of cubes are chosen.
+const VOXEL_BYTES: u64 = 32;
 
 /// Reads the inputs and writes the file.
 pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
@@ -19,10 +28,9 @@ pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> 
     if tree::is_tree(&output) {
         return tree::run(args, &inputs, &output, console);
     }
-    if args.memory.is_some() || args.temp.is_some() {
-        return Err(Failure::usage(
-            "--memory, --temp: only an octree, a name that ends in .copc.laz, is made in parts",
-        ));
+    let need = Need { what: "the work", memory: BYTES_PER_POINT, disk: thinning.voxel.map_or(0, |_| VOXEL_BYTES) };
+    if let Some(parts) = parts(&inputs, &args.room, part, &output, &need, console)? {
+        return in_parts(args, &parts, &output, console);
     }
     inputs.check_memory()?;
     let (mut cloud, read) = match input.playing.sample {
@@ -34,16 +42,39 @@ pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> 
         }
         None => inputs.read_part(part, console)?,
     };
-    if cloud.crs().unit == Some(Unit::Degree) && (thinning.voxel.is_some() || thinning.noise.is_some()) {
-        console.note("the coordinates are in degrees, so --voxel and --noise are too");
-    }
+    note_degrees(cloud.crs(), thinning, console);
     thin(&mut cloud, thinning, console)?;
     if cloud.is_empty() {
         return Err(Failure::new(Exit::Input, format!("none of the {read} points lies inside; widen --bounds")));
     }
     let bytes = write_cloud(&cloud, &output, console)?;
-    let of = if (cloud.len() as u64) < read { format!(" of {read}") } else { String::new() };
-    console.tell(format_args!("{}: {}{of} points, {bytes} bytes", output.display(), cloud.len()));
+    tell(&output, cloud.len() as u64, read, bytes, console);
+    Ok(())
+}
+
+fn tell(output: &Path, kept: u64, read: u64, bytes: u64, console: &Console) {
+    let of = if kept < read { format!(" of {read}") } else { String::new() };
+    console.tell(format_args!("{}: {kept}{of} points, {bytes} bytes", output.display()));
+}
+
+fn note_degrees(crs: &Crs, thinning: &ThinningArgs, console: &Console) {
+    if crs.unit == Some(Unit::Degree) && (thinning.voxel.is_some() || thinning.noise.is_some()) {
+        console.note("the coordinates are in degrees, so --voxel and --noise are too");
+    }
+}
+
+/// Thins and writes points that memory does not hold.
+fn in_parts(args: &ConvertArgs, parts: &Parts, output: &Path, console: &Console) -> Result<(), Failure> {
+    let ThinningArgs { every, voxel, noise, seed } = args.thinning;
+    note_degrees(parts.clouds.crs(), &args.thinning, console);
+    let thinning = Thinning { bounds: args.part.bounds, every, voxel, noise: noise.map(|sigma| (sigma, seed)) };
+    let _writing = console.interrupt().writing();
+    let bar = Bar::new("thinning", console);
+    let thinned = Thinned::new(&parts.clouds, thinning, &parts.folder, parts.memory, &bar);
+    let thinned = thinned.map_err(|error| parts.failure(error, output))?;
+    drop((bar, _writing));
+    let bytes = write_parts(&thinned, output, parts, console)?;
+    tell(output, thinned.kept(), parts.points, bytes, console);
     Ok(())
 }
 

@@ -3,14 +3,15 @@
 use std::fs::metadata;
 use std::path::Path;
 
-use autosplats_cloud::{Error, usual_memory};
+use autosplats_cloud::usual_memory;
 use autosplats_formats::{TreeOptions, write_tree};
 
 use crate::args::ConvertArgs;
 use crate::console::Console;
-use crate::exit::{Exit, Failure};
+use crate::exit::Failure;
 use crate::input::Inputs;
 use crate::output::{cannot_write, folder_of};
+use crate::parts::failure;
 use crate::progress::Bar;
 
 /// What the names of octrees end in.
@@ -43,16 +44,16 @@ fn check(args: &ConvertArgs) -> Result<(), Failure> {
 pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: &Path, console: &Console) -> Result<(), Failure> {
     check(args)?;
     let options = TreeOptions {
-        memory: args.memory.unwrap_or_else(usual_memory),
-        temp: args.temp.clone(),
+        memory: args.room.memory.unwrap_or_else(usual_memory),
+        temp: args.room.temp.clone(),
         bounds: args.part.bounds,
         keep: args.input.reading.keep.clone(),
         keep_no_returns: args.input.reading.keep_no_returns,
     };
     let bar = Bar::on_file("building", output, console);
     let _writing = console.interrupt().writing();
-    let summary =
-        write_tree(inputs.streamed(), output, &options, &bar).map_err(|error| failure(error, output, &options))?;
+    let temp = options.temp.as_deref().unwrap_or(folder_of(output));
+    let summary = write_tree(inputs.streamed(), output, &options, &bar).map_err(|error| failure(error, output, temp))?;
     drop(bar);
     let bytes = metadata(output).map(|metadata| metadata.len()).map_err(|error| cannot_write(output, &error))?;
     console.tell(format_args!(
@@ -62,18 +63,4 @@ pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: &Path, console: &
         summary.nodes
     ));
     Ok(())
-}
-
-/// The failure of an error: of the output, if that or the folder of temporary files is to blame.
-fn failure(error: Error, output: &Path, options: &TreeOptions) -> Failure {
-    let temp = options.temp.as_deref().unwrap_or(folder_of(output));
-    match &error {
-        Error::Io { path, source } if path == output => cannot_write(output, source),
-        Error::Io { path, source } if path == temp => {
-            Failure::new(Exit::Output, format!("{}: {source}", temp.display()))
-        }
-        Error::OutOfMemory { .. } => Failure::new(Exit::Memory, error),
-        Error::Cancelled => Failure::interrupted(),
-        _ => Failure::from(error),
-    }
 }

@@ -5,8 +5,8 @@ use std::io::Read as _;
 use std::path::Path;
 
 use autosplats_cloud::glam::DMat4;
-use autosplats_cloud::{Error, PointCloud, Progress};
-use autosplats_formats::{Clouds, TreeInput};
+use autosplats_cloud::{Clouds, Error, PointCloud, Progress};
+use autosplats_formats::{TreeInput, describe, open_parts};
 use autosplats_scenes::Scene;
 use autosplats_sources::{Input, Source};
 
@@ -20,10 +20,41 @@ impl Inputs {
     pub(crate) fn streamed(&self) -> Vec<TreeInput<'_>> {
         self.list.iter().map(streamed).collect()
     }
+
+    /// Number of points that the only input states, if it can be read in parts.
+    pub(crate) fn stated_points(&self) -> Option<u64> {
+        match self.list.as_slice() {
+            [input] if is_plain(input) => match &input.source {
+                Source::File(path) if is_las(path) => describe(path, &input.options).ok()?.points,
+                Source::Scene(_, count) if !input.moves() => Some(*count as u64),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// The only input, to be read in parts. `None` if it has to be read whole.
+    pub(crate) fn in_parts(&self, progress: &dyn Progress) -> Result<Option<Box<dyn Clouds + '_>>, Error> {
+        let [input] = self.list.as_slice() else { return Ok(None) };
+        match &input.source {
+            Source::File(path) if is_plain(input) => {
+                Ok(open_parts(path, &input.options, progress)?.map(|parts| Box::new(parts) as Box<dyn Clouds>))
+            }
+            Source::Scene(scene, count) if is_plain(input) && !input.moves() => {
+                Ok(Some(Box::new(SceneClouds { name: &input.name, scene, count: *count })))
+            }
+            _ => Ok(None),
+        }
+    }
+}
+
+/// Whether the input has no pose and is not sampled.
+fn is_plain(input: &Input) -> bool {
+    input.world_from_input == DMat4::IDENTITY && !is_made(input)
 }
 
 fn streamed(input: &Input) -> TreeInput<'_> {
-    let plain = input.world_from_input == DMat4::IDENTITY && !is_made(input);
+    let plain = is_plain(input);
     match &input.source {
         Source::File(path) if plain && is_las(path) => TreeInput::Las(path.clone()),
         Source::Scene(scene, count) if plain && !input.moves() => {
@@ -50,7 +81,7 @@ impl Clouds for Whole<'_> {
     fn read(
         &self,
         progress: &dyn Progress,
-        take: &(dyn Fn(&PointCloud) -> Result<(), Error> + Sync),
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let cloud = read_whole(self.0, progress)?;
         let pose = self.0.world_from_input;
@@ -70,10 +101,14 @@ impl Clouds for SceneClouds<'_> {
         Path::new(self.name)
     }
 
+    fn points(&self) -> Option<u64> {
+        Some(self.count as u64)
+    }
+
     fn read(
         &self,
         progress: &dyn Progress,
-        take: &(dyn Fn(&PointCloud) -> Result<(), Error> + Sync),
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let sampler = self.scene.sampler(self.count)?;
         for first in (0..self.count).step_by(SCENE_PART) {

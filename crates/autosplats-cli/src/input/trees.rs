@@ -48,6 +48,11 @@ impl Inputs {
         Ok((cloud, all.into_inner()))
     }
 
+    /// Whether the only input is a file that may be an octree, by its name.
+    pub(crate) fn only_tree(&self) -> bool {
+        matches!(self.list.as_slice(), [input] if input.name.to_ascii_lowercase().ends_with(".copc.laz"))
+    }
+
     /// Opens the inputs as octrees, with their poses. `None` if they are to be read whole: one of them is no octree, or
     /// all are files with few points and `always` is not set.
     pub(crate) fn trees(&self, always: bool, console: &Console) -> Result<Option<Vec<PlacedTree>>, Failure> {

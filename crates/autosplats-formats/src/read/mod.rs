@@ -27,6 +27,7 @@ mod names;
 mod obj;
 mod off;
 mod options;
+mod parts;
 mod pcd;
 mod placed;
 mod ply;
@@ -46,6 +47,7 @@ pub use self::{
     depth_image::color::beside as colors_beside,
     describe::{Attribute, Description},
     options::ReadOptions,
+    parts::{Parts, open_parts},
     registry::{
         check_not_lfs_pointer, describe, describe_bytes, formats, gltf_animation, is_named_as_points, read, read_bytes,
         read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with,

@@ -326,7 +326,7 @@ impl NormalsInParts {
     ///
     /// # Panics
     /// If there are no such points.
-    pub fn read(&self, points: Range<u64>) -> Result<Normals, Error> {
+    pub fn read(&self, points: Range<u64>) -> Result<Normals, autosplats_cloud::Error> {
         assert!(points.start <= points.end && points.end <= self.len, "points {points:?} of {}", self.len);
         let count = (points.end - points.start) as usize;
         let mut values = vec![[0.0_f32; RESULT / 4]; count];
@@ -419,7 +419,7 @@ mod tests {
             let cloud = PointCloud::new(DVec3::ZERO, positions);
             let settings = NormalSettings { orientation: Orientation::Direction(DVec3::Z), ..Default::default() };
             let whole = estimate_normals(&cloud, &settings, &()).expect("settings are valid");
-            let parts = in_parts(&cloud, &settings, 8);
+            let parts = in_parts(&cloud, &settings, 12);
             assert_eq!(parts.read(0..count as u64).expect("the file is there").radius, whole.radius, "{count} points");
         }
     }

@@ -41,7 +41,7 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Error, Held, Part as PartOf, PointFilter, Progress, Spill, free_disk, lock, usual_memory, write_whole,
+    Error, Held, Part as PartOf, PointFilter, Progress, Spill, check_disk, lock, usual_memory, write_whole,
 };
 use glam::DVec3;
 use rayon::prelude::*;
@@ -217,20 +217,9 @@ impl Making<'_> {
     /// Fails if the disk has less room than the records take, before anything is read.
     fn check_disk(&self) -> Result<(), Error> {
         let need = self.points * self.schema.record_len as u64;
-        let folder = self.folder();
-        let Some(free) = free_disk(folder) else { return Ok(()) };
         // The file itself is a part of the size of its records.
         let beside = if self.options.temp.is_none() { need / OUTPUT_PART } else { 0 };
-        if need + beside > free {
-            let [need, free] = [need + beside, free].map(|bytes| bytes.div_ceil(1 << 20));
-            let what = format!(
-                "making the octree takes {need} MiB of disk for a while, but only {free} MiB are free; name another \
-                 folder for temporary files"
-            );
-            let source = std::io::Error::new(std::io::ErrorKind::StorageFull, what);
-            return Err(Error::Io { path: folder.into(), source });
-        }
-        Ok(())
+        check_disk(self.folder(), need + beside, "making the octree")
     }
 
     fn folder(&self) -> &Path {

@@ -1,0 +1,120 @@
+//! Work on more points than memory holds, in parts.
+
+use std::path::{Path, PathBuf};
+
+use autosplats_cloud::{Clouds, Error, Part, Progress as _, Spool, available_memory, check_disk, usual_memory};
+
+use crate::args::{PartArgs, RoomArgs};
+use crate::console::Console;
+use crate::exit::{Exit, Failure};
+use crate::input::Inputs;
+use crate::output::{cannot_write, folder_of};
+use crate::progress::Bar;
+
+/// Bytes that a point takes on the disk while it waits there, with all its values, in most scans.
+const SPOOLED_BYTES: u64 = 60;
+
+/// Points of the only input, which wait on the disk, and the room for work on them.
+pub(crate) struct Parts {
+    pub(crate) clouds: Spool,
+    pub(crate) points: u64,
+    /// Memory to use, in bytes.
+    pub(crate) memory: u64,
+    /// Folder for temporary files.
+    pub(crate) folder: PathBuf,
+}
+
+/// What the work needs.
+pub(crate) struct Need<'a> {
+    /// What it is called.
+    pub(crate) what: &'a str,
+    /// Memory per point if all are worked on at once, in bytes.
+    pub(crate) memory: u64,
+    /// Disk per point beside the points themselves, if they are worked on in parts.
+    pub(crate) disk: u64,
+}
+
+/// Reads the only input onto the disk, if its points need more memory than there is. `None` if they are to be worked on
+/// at once.
+pub(crate) fn parts(
+    inputs: &Inputs,
+    room: &RoomArgs,
+    part: &PartArgs,
+    output: &Path,
+    need: &Need<'_>,
+    console: &Console,
+) -> Result<Option<Parts>, Failure> {
+    let memory = room.memory.or_else(|| available_memory().map(|free| free / 4 * 3));
+    // Of octrees, bounds and spacing read only what they need.
+    let whole = part.spacing.is_some() || part.bounds.is_some() && inputs.only_tree();
+    let Some(points) = inputs.stated_points().filter(|_| !whole) else {
+        if room.memory.is_some() && !whole {
+            console.note(
+                "--memory: only one LAS, LAZ or COPC file or scene is worked on in parts, all else at once; make one octree \
+                 of the inputs first, such as all.copc.laz",
+            );
+        }
+        return Ok(None);
+    };
+    let least = points.saturating_mul(need.memory);
+    if memory.is_none_or(|memory| least <= memory) {
+        return Ok(None);
+    }
+    let memory = room.memory.unwrap_or_else(usual_memory);
+    let folder = room.temp.clone().unwrap_or_else(|| folder_of(output).to_owned());
+    let failed = |error| failure(error, output, &folder);
+    check_disk(&folder, points.saturating_mul(SPOOLED_BYTES + need.disk), need.what).map_err(failed)?;
+    let bar = Bar::on_file("reading", Path::new(&inputs.names()), console);
+    let _writing = console.interrupt().writing();
+    let first = Part { whole: &bar, start: 0.0, len: 0.5 };
+    let Some(clouds) = inputs.in_parts(&first).map_err(failed)? else { return Ok(None) };
+    let second = Part { whole: &bar, start: 0.5, len: 0.5 };
+    let clouds = Spool::of(&*clouds, &folder, &second).map_err(failed)?;
+    bar.report(1.0);
+    let points = clouds.points().unwrap_or(points);
+    Ok(Some(Parts { clouds, points, memory, folder }))
+}
+
+impl Parts {
+    /// The failure of an error in the work.
+    pub(crate) fn failure(&self, error: impl Into<WorkError>, output: &Path) -> Failure {
+        match error.into() {
+            WorkError::Cloud(error) => failure(error, output, &self.folder),
+            WorkError::Other(error) => error.into(),
+        }
+    }
+}
+
+/// An error of work on points.
+pub(crate) enum WorkError {
+    Cloud(Error),
+    Other(autosplats::Error),
+}
+
+impl From<Error> for WorkError {
+    fn from(error: Error) -> Self {
+        Self::Cloud(error)
+    }
+}
+
+impl From<autosplats::Error> for WorkError {
+    fn from(error: autosplats::Error) -> Self {
+        match error {
+            autosplats::Error::Reading(error) => Self::Cloud(error),
+            error => Self::Other(error),
+        }
+    }
+}
+
+/// The failure of an error: of the output, if that or the folder of temporary files is to blame.
+pub(crate) fn failure(error: Error, output: &Path, temp: &Path) -> Failure {
+    match &error {
+        Error::Io { path, source } if path == output => cannot_write(output, source),
+        Error::Io { path, source } if path == temp => {
+            Failure::new(Exit::Output, format!("{}: {source}", temp.display()))
+        }
+        Error::OutOfMemory { .. } => Failure::new(Exit::Memory, error),
+        Error::Cancelled => Failure::interrupted(),
+        _ => Failure::from(error),
+    }
+}
