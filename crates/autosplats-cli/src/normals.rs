@@ -18,7 +18,7 @@ use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{check_cloud_target, write_cloud, write_parts};
-use crate::parts::{Need, Parts, WorkError, parts};
+use crate::parts::{Need, Parts, WorkError, check_room, parts};
 use crate::progress::Bar;
 
 /// Bytes per point beside the cloud: the search tree and the result.
@@ -46,6 +46,7 @@ pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> 
         )));
     }
     check_cloud_target(&output, *force, &inputs.files([]), console)?;
+    check_room(room)?;
     let need = Need { what: "the work", memory: BYTES_PER_POINT + CLOUD_BYTES, disk: DISK_BYTES };
     if let Some(parts) = parts(&inputs, room, part, &output, &need, console)? {
         return in_parts(args, &parts, &output, console);
@@ -123,7 +124,8 @@ impl Overview {
             let finite = cloud.positions().iter().filter(|place| place.iter().all(|value| value.is_finite()));
             let none = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
             let [low, high] = finite.fold(none, |[low, high], place| {
-                let join = |ends: [f32; 3], pick: fn(f32, f32) -> f32| [0, 1, 2].map(|axis| pick(ends[axis], place[axis]));
+                let join =
+                    |ends: [f32; 3], pick: fn(f32, f32) -> f32| [0, 1, 2].map(|axis| pick(ends[axis], place[axis]));
                 [join(low, f32::min), join(high, f32::max)]
             });
             let corners = PointCloud::new(cloud.origin(), vec![low, high]);
@@ -142,12 +144,9 @@ impl Overview {
     }
 
     /// As of a cloud that is in memory.
-    fn orientation(
-        &self,
-        choice: OrientChoice,
-        sensor: Option<DVec3>,
-    ) -> Result<(Orientation, &'static str), Failure> {
-        let all = |position: DVec3| Orientation::Viewpoints(vec![Viewpoint { position, points: 0..self.points as usize }]);
+    fn orientation(&self, choice: OrientChoice, sensor: Option<DVec3>) -> Result<(Orientation, &'static str), Failure> {
+        let all =
+            |position: DVec3| Orientation::Viewpoints(vec![Viewpoint { position, points: 0..self.points as usize }]);
         if let Some(position) = sensor {
             return Ok((all(position), TO_GIVEN));
         }

@@ -87,12 +87,7 @@ pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, console: &Console) ->
 }
 
 /// Like [`write_cloud`], of points that memory does not hold.
-pub(crate) fn write_parts(
-    clouds: &dyn Clouds,
-    path: &Path,
-    parts: &Parts,
-    console: &Console,
-) -> Result<u64, Failure> {
+pub(crate) fn write_parts(clouds: &dyn Clouds, path: &Path, parts: &Parts, console: &Console) -> Result<u64, Failure> {
     let bar = Bar::on_file("writing", path, console);
     let _writing = console.interrupt().writing();
     write_clouds(clouds, path, &bar).map_err(|error| parts.failure(error, path))?;

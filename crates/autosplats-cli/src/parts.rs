@@ -34,6 +34,16 @@ pub(crate) struct Need<'a> {
     pub(crate) disk: u64,
 }
 
+/// Fails if the folder for temporary files is none.
+pub(crate) fn check_room(room: &RoomArgs) -> Result<(), Failure> {
+    match &room.temp {
+        Some(folder) if !folder.is_dir() => {
+            Err(Failure::new(Exit::Output, format!("--temp {}: there is no such folder", folder.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Reads the only input onto the disk, if its points need more memory than there is. `None` if they are to be worked on
 /// at once.
 pub(crate) fn parts(
@@ -56,6 +66,12 @@ pub(crate) fn parts(
         }
         return Ok(None);
     };
+    if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("e57")) {
+        if room.memory.is_some() {
+            console.note("--memory: E57 is written from memory; .laz and .ply are written in parts");
+        }
+        return Ok(None);
+    }
     let least = points.saturating_mul(need.memory);
     if memory.is_none_or(|memory| least <= memory) {
         return Ok(None);

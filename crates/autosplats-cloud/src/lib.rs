@@ -48,14 +48,16 @@ mod tree;
 
 pub use axes::Axes;
 pub use classes::class_name;
-pub use clouds::{Clouds, Held};
 pub use cloud::{Field, FieldValues, PointCloud, Scan};
+pub use clouds::{Clouds, Held};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use encoding::{Unmarked, read_text};
 pub use error::{Error, excerpt, one_line, printable, shown_number};
 pub use error_kind::ErrorKind;
-pub use files::{Bytes, check_disk, free_disk, read_exact_at, temporary_beside, temporary_unnamed, write_all_at, write_whole};
+pub use files::{
+    Bytes, check_disk, free_disk, read_exact_at, temporary_beside, temporary_unnamed, write_all_at, write_whole,
+};
 pub use filter::{LeftOut, PointFilter};
 pub use geographic::{LocalMetres, looks_like_degrees};
 /// Vector library of the public interface.

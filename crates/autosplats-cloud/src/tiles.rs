@@ -84,7 +84,11 @@ struct Splits {
 #[derive(Clone, Copy)]
 enum Node {
     /// Points below `at` along the axis are in the first node, others in the second.
-    Split { axis: usize, at: f32, nodes: [u32; 2] },
+    Split {
+        axis: usize,
+        at: f32,
+        nodes: [u32; 2],
+    },
     Box(u32),
 }
 
@@ -235,7 +239,8 @@ impl Tiles {
                 let range = piece * PIECE..cloud.len().min((piece + 1) * PIECE);
                 let placed = range.map(|i| (about(self.origin, cloud, i), first + i as u64));
                 let placed = placed.filter(|(position, _)| is_finite(*position));
-                let mut placed: Vec<_> = placed.map(|(position, i)| (self.splits.find(position), position, i)).collect();
+                let mut placed: Vec<_> =
+                    placed.map(|(position, i)| (self.splits.find(position), position, i)).collect();
                 // Stable, though the order of points in a box does not matter.
                 placed.sort_by_key(|(number, ..)| *number);
                 let mut records = Vec::new();
@@ -304,7 +309,8 @@ impl Tiles {
     pub fn load(&self, number: usize, halo: f32, most: usize) -> Result<Option<Tile>, Error> {
         let [low, high] = self.area(number);
         let known = [low.map(|value| value - halo), high.map(|value| value + halo)];
-        let inside = |position: &[f32; 3]| (0..3).all(|axis| (known[0][axis]..=known[1][axis]).contains(&position[axis]));
+        let inside =
+            |position: &[f32; 3]| (0..3).all(|axis| (known[0][axis]..=known[1][axis]).contains(&position[axis]));
         let meets = |other: &usize| {
             let [low, high] = self.area(*other);
             *other == number || (0..3).all(|axis| low[axis] <= known[1][axis] && high[axis] >= known[0][axis])

@@ -11,7 +11,7 @@ use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{check_cloud_target, write_cloud, write_parts};
-use crate::parts::{Need, Parts, parts};
+use crate::parts::{Need, Parts, check_room, parts};
 use crate::progress::Bar;
 
 /// Bytes per point that all points at once need: all their values, with all digits, and what writing takes.
@@ -25,6 +25,7 @@ pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> 
     let ConvertArgs { paths, input, force, part, thinning, .. } = args;
     let (inputs, output) = Inputs::with_output(paths, args.output.as_deref(), input)?;
     check_cloud_target(&output, *force, &inputs.files([]), console)?;
+    check_room(&args.room)?;
     if tree::is_tree(&output) {
         return tree::run(args, &inputs, &output, console);
     }

@@ -53,7 +53,8 @@ pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: &Path, console: &
     let bar = Bar::on_file("building", output, console);
     let _writing = console.interrupt().writing();
     let temp = options.temp.as_deref().unwrap_or(folder_of(output));
-    let summary = write_tree(inputs.streamed(), output, &options, &bar).map_err(|error| failure(error, output, temp))?;
+    let summary =
+        write_tree(inputs.streamed(), output, &options, &bar).map_err(|error| failure(error, output, temp))?;
     drop(bar);
     let bytes = metadata(output).map(|metadata| metadata.len()).map_err(|error| cannot_write(output, &error))?;
     console.tell(format_args!(

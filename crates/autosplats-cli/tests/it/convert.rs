@@ -96,7 +96,7 @@ fn any_inputs_become_an_octree() {
     let folder = Folder::with_sphere();
     let outcome =
         folder.succeed(&["convert", "sphere.ply", "scene:figure:30K", "-o", "all.copc.laz", "--memory", "200M"]);
-    assert!(outcome.stdout.contains(&format!("{} points in", SPHERE_POINTS + 30_000)), "{}", outcome.stdout);
+    assert!(outcome.stderr.contains(&format!("{} points in", SPHERE_POINTS + 30_000)), "{}", outcome.stderr);
     let info = folder.succeed(&["info", "all.copc.laz", "--json"]).stdout;
     let info: serde_json::Value = serde_json::from_str(&info).expect("JSON");
     let text = info.to_string();
@@ -113,12 +113,11 @@ fn what_no_octree_can_be_made_of_is_refused() {
     folder.write("empty.xyz", "");
     folder.write("old.copc.laz", "precious");
     let before = folder.list();
-    let cases: [(&[&str], u8, &[&str]); 7] = [
+    let cases: [(&[&str], u8, &[&str]); 6] = [
         (&["sphere.ply", "a.copc.laz", "--voxel", "0.1"], 2, &["--voxel", "octree"]),
-        (&["sphere.ply", "a.ply", "--memory", "1G"], 2, &["--memory", ".copc.laz"]),
         (&["sphere.ply", "a.copc.laz", "--temp", "nowhere"], 4, &["nowhere"]),
-        (&["sphere.ply", "a.copc.laz", "--memory", "1M"], 6, &["MiB"]),
-        (&["sphere.ply", "a.copc.laz", "--bounds", "900,900,900,901,901,901"], 3, &["--bounds"]),
+        (&["scene:figure:30K", "a.copc.laz", "--memory", "1M"], 6, &["MiB"]),
+        (&["scene:figure:30K", "a.copc.laz", "--bounds", "900,900,900,901,901,901"], 3, &["--bounds"]),
         (&["empty.xyz", "a.copc.laz"], 3, &["empty.xyz"]),
         (&["sphere.ply", "old.copc.laz"], 4, &["--force"]),
     ];
@@ -127,4 +126,33 @@ fn what_no_octree_can_be_made_of_is_refused() {
     }
     assert_eq!(folder.list(), before, "nothing is left behind");
     assert_eq!(folder.read("old.copc.laz"), b"precious");
+}
+
+/// Of each kind of output, and each kind of thinning, the same bytes as if memory held all points.
+#[test]
+fn more_points_than_memory_holds_are_converted_in_parts() {
+    let folder = Folder::with_sphere();
+    folder.succeed(&["convert", "scene:figure:100K", "scan.laz"]);
+    let box_of_some = ["--bounds", "-1,-1,0.5,1,0.1,1.5"];
+    for (output, options) in [
+        ("a.ply", &[][..]),
+        ("a.las", &["--every", "3"]),
+        ("a.laz", &["--voxel", "0.02", "--noise", "0.001"]),
+        ("a.xyz", &box_of_some),
+        ("a.pcd", &["--noise", "0.01", "--seed", "7"]),
+    ] {
+        let whole = ["convert", "scan.laz", output, "--force"];
+        folder.succeed(&[&whole[..], options].concat());
+        let expected = folder.read(output);
+        let outcome = folder.succeed(&[&whole[..], options, &["--memory", "5M"]].concat());
+        assert!(folder.read(output) == expected, "{output} {options:?}: {}", outcome.stderr);
+        assert_eq!(outcome.stderr.contains(" of 100000 points"), options.len() > 2 || options == ["--every", "3"]);
+    }
+    let nothing = ["convert", "scan.laz", "b.ply", "--memory", "5M", "--bounds", "9,9,9,10,10,10"];
+    folder.fail(&nothing, 3, &["none of the 100000 points", "--bounds"]);
+    let outcome = folder.succeed(&["convert", "scan.laz", "b.e57", "--memory", "5M"]);
+    assert!(outcome.stderr.contains("note: --memory: E57"), "{}", outcome.stderr);
+    folder.fail(&["convert", "scan.laz", "b.ply", "--memory", "5M", "--temp", "nowhere"], 4, &["nowhere"]);
+    let outcome = folder.succeed(&["convert", "sphere.ply", "scan.laz", "b.ply", "--memory", "5M"]);
+    assert!(outcome.stderr.contains("note: --memory"), "several inputs are joined at once: {}", outcome.stderr);
 }

@@ -68,3 +68,30 @@ fn normals_turn_to_a_sensor() {
     folder.fail(&["normals", "sphere.ply", "b.ply", "-k", "2"], 2, &["3 to 1024"]);
     folder.fail(&["normals", "sphere.ply", "out.ply"], 4, &["--force"]);
 }
+
+#[test]
+fn more_points_than_memory_holds_have_the_same_normals() {
+    let folder = Folder::with_sphere();
+    folder.succeed(&["convert", "scene:figure:100K", "scan.laz"]);
+    for options in [&["--orient", "up"][..], &["--sensor", "0,-9,1"], &["-k", "20"]] {
+        folder.succeed(&[&["normals", "scan.laz", "whole.ply", "--force"], options].concat());
+        let in_parts = ["normals", "scan.laz", "parts.ply", "--force", "--memory", "4M"];
+        let outcome = folder.succeed(&[&in_parts, options].concat());
+        assert!(outcome.stderr.contains("parts, 0 in doubt"), "{}", outcome.stderr);
+        let ([names, others], [whole, parts]) = {
+            let [(a, b), (c, d)] = ["whole.ply", "parts.ply"].map(|name| rows(&folder.read(name)));
+            ([a, c], [b, d])
+        };
+        assert_eq!((&names, whole.len()), (&others, parts.len()), "{options:?}");
+        let column = |name: &str| names.iter().position(|found| found == name).unwrap_or_else(|| panic!("no {name}"));
+        let [nx, ny, nz] = ["nx", "ny", "nz"].map(column);
+        let radius = column("DensityRadius");
+        let same = |(a, b): (&Vec<f32>, &Vec<f32>)| {
+            let cosine = a[nx] * b[nx] + a[ny] * b[ny] + a[nz] * b[nz];
+            // A tenth of a degree.
+            a[..3] == b[..3] && cosine > 0.999_998 && (a[radius] - b[radius]).abs() <= 1e-5 * a[radius]
+        };
+        let unlike = whole.iter().zip(&parts).filter(|pair| !same(*pair)).count();
+        assert!(unlike <= whole.len() / 10_000, "{options:?}: {unlike} of {} differ", whole.len());
+    }
+}

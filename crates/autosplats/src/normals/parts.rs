@@ -151,9 +151,7 @@ impl Work<'_> {
         let Some(mut tile) = self.first(number)? else {
             let count = self.tiles.count(number);
             let what = format!("{count} points at one place, or nearly so, of which normals are estimated together,");
-            return Err(
-                autosplats_cloud::Error::OutOfMemory { what, bytes: (count * BYTES_PER_POINT) as usize }.into()
-            );
+            return Err(autosplats_cloud::Error::OutOfMemory { what, bytes: (count * BYTES_PER_POINT) as usize }.into());
         };
         let mut normals = self.estimate(&tile, &half)?;
         let mut needs = self.needs(number, &tile, &normals);

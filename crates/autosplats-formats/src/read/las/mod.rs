@@ -156,8 +156,7 @@ fn cut_off(lost: u64, claimed: u64) -> Option<String> {
 
 /// Note on points that cannot be decompressed.
 fn damage(lost: u64, claimed: u64) -> Option<String> {
-    (lost > 0)
-        .then(|| format!("compressed data are damaged: {lost} of {claimed} points are lost; copy the file again"))
+    (lost > 0).then(|| format!("compressed data are damaged: {lost} of {claimed} points are lost; copy the file again"))
 }
 
 /// The number of complete records, and the number of missing ones.

@@ -85,9 +85,8 @@ impl LasParts {
         progress: &dyn Progress,
         take: &mut dyn FnMut(Columns<'_>, usize, String) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let columns = |count: usize| {
-            Columns::new(&self.header, self.origin, self.exact, self.dimensions.clone(), count, colors)
-        };
+        let columns =
+            |count: usize| Columns::new(&self.header, self.origin, self.exact, self.dimensions.clone(), count, colors);
         let spaces: Mutex<Vec<Space>> = Mutex::default();
         let (mut run, mut done) = (0, 0);
         while run < self.stream.runs() {
