@@ -12,7 +12,7 @@ use crate::output::{cannot_write, folder_of};
 use crate::progress::Bar;
 
 /// Bytes that a point takes on the disk while it waits there, with all its values, in most scans.
-const SPOOLED_BYTES: u64 = 60;
+pub(crate) const SPOOLED_BYTES: u64 = 60;
 
 /// Points of the only input, which wait on the disk, and the room for work on them.
 pub(crate) struct Parts {

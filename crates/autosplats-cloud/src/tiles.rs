@@ -276,6 +276,11 @@ impl Tiles {
         self.all
     }
 
+    /// Whether a point of a cloud has a position that is in some tile.
+    pub fn has(&self, cloud: &PointCloud, index: usize) -> bool {
+        is_finite(about(self.origin, cloud, index))
+    }
+
     /// The place in world coordinates that positions are about.
     pub fn origin(&self) -> DVec3 {
         self.origin

@@ -60,7 +60,7 @@ pub(crate) struct RoomArgs {
     /// [default: what is free; for octrees a quarter of it, at most 2G]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,
-    /// Folder for temporary files of work in parts [default: that of the output]
+    /// Folder for temporary files of work in parts [default: that of the output, or the system's]
     #[arg(long, value_name = "FOLDER")]
     pub(crate) temp: Option<PathBuf>,
 }
@@ -205,6 +205,8 @@ be read are reported."
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
+    #[command(flatten)]
+    pub(crate) room: RoomArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }

@@ -1,19 +1,21 @@
 //! Examines an input: from its name to a report.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use autosplats::guess_axes;
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{Error, FieldValues, PointCloud, Unit, check_memory};
+use autosplats_cloud::{Clouds, Crs, Error, FieldValues, Held, Part, PointCloud, Progress, Unit, check_memory};
 use autosplats_formats::{Attribute, Description, ReadOptions, describe, describe_tree};
 use autosplats_sources::{PlayOptions, RecordingSummary, Source, describe_recording};
 use rayon::prelude::*;
 
 use super::notes::NoteCollector;
 use super::report::{AttributeFound, AxesFound, Bounds, CrsFound, Detail, Report, ScanFound};
+use super::room::Room;
 use super::spacing;
-use super::statistics::{Statistics, Values};
+use super::statistics::{Bins, Statistics, Summary, Values};
 use crate::args::InputArgs;
 use crate::console::Console;
 use crate::exit::Failure;
@@ -28,6 +30,7 @@ const LARGE_FILE_BYTES: u64 = 64 << 20;
 pub(super) struct Examiner {
     options: ReadOptions,
     scan: bool,
+    room: Room,
     console: Console,
     /// Held while a large input is read.
     large: Mutex<()>,
@@ -40,8 +43,8 @@ pub(super) struct Examination {
 }
 
 impl Examiner {
-    pub(super) fn new(options: ReadOptions, scan: bool, console: Console) -> Self {
-        Self { options, scan, console, large: Mutex::new(()) }
+    pub(super) fn new(options: ReadOptions, scan: bool, room: Room, console: Console) -> Self {
+        Self { options, scan, room, console, large: Mutex::new(()) }
     }
 
     pub(super) fn examine(&self, name: &str) -> Examination {
@@ -75,13 +78,24 @@ impl Examiner {
         let _alone = (bytes >= LARGE_FILE_BYTES).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
         let bar = Bar::on_file("reading", path, &self.console);
         let listener = NoteCollector::new(&bar);
-        let cloud = source.read(&self.options, &listener);
+        let points = header.points.unwrap_or(0);
+        if self.room.holds(points) {
+            let cloud = source.read(&self.options, &listener);
+            listener.notes().into_iter().for_each(|note| report.warn(note));
+            drop(bar);
+            let bar = Bar::spinner("measuring", &self.console);
+            report.scan(&cloud?, &header.attributes)?;
+            drop(bar);
+            return Ok(());
+        }
+        let parts = self.room.spool(path, points, &self.options, &listener);
         listener.notes().into_iter().for_each(|note| report.warn(note));
         drop(bar);
-        let bar = Bar::spinner("measuring", &self.console);
-        report.scan(&cloud?, &header.attributes);
-        drop(bar);
-        Ok(())
+        let bar = Bar::new("measuring", &self.console);
+        match parts? {
+            Some(parts) => report.scan_all(&parts, &header.attributes, Some(&self.room), &bar),
+            None => report.scan(&source.read(&self.options, &())?, &header.attributes),
+        }
     }
 
     /// Describes what is behind an address: an octree by its header and hierarchy, all else by its points.
@@ -95,7 +109,7 @@ impl Examiner {
         if self.scan || tree.is_none() {
             let cloud = source.read(&self.options, &listener)?;
             report.format.get_or_insert_with(|| "remote file".into());
-            report.scan(&cloud, &[]);
+            report.scan(&cloud, &[])?;
         }
         listener.notes().into_iter().for_each(|note| report.warn(note));
         Ok(())
@@ -128,8 +142,7 @@ impl Examiner {
             let which = which_frame(&player).unwrap_or_else(|| "the first frame".into());
             report.warn(format!("points, bounds and attributes are those of {which}"));
         }
-        report.scan(&cloud, &[]);
-        Ok(())
+        report.scan(&cloud, &[])
     }
 
     fn scene(&self, name: &str, scene: &Source, report: &mut Report) -> Result<(), Error> {
@@ -137,8 +150,7 @@ impl Examiner {
         let _alone = large.then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
         let cloud = scene.read(&self.options, &Bar::new(&format!("generating {name}"), &self.console))?;
         report.format = Some("generated scene".into());
-        report.scan(&cloud, &[]);
-        Ok(())
+        report.scan(&cloud, &[])
     }
 }
 
@@ -199,44 +211,61 @@ impl Report {
     }
 
     /// Adds what all points show; this overrides the header.
-    fn scan(&mut self, cloud: &PointCloud, attributes: &[Attribute]) {
+    fn scan(&mut self, cloud: &PointCloud, attributes: &[Attribute]) -> Result<(), Error> {
+        self.scan_all(&Held { name: Path::new(""), cloud }, attributes, None, &())
+    }
+
+    /// Like [`scan`](Self::scan), of points that may come in parts. `room` is for work on their neighbourhoods, if
+    /// memory does not hold them all.
+    fn scan_all(
+        &mut self,
+        clouds: &dyn Clouds,
+        attributes: &[Attribute],
+        room: Option<&Room>,
+        progress: &dyn Progress,
+    ) -> Result<(), Error> {
         self.scanned = true;
         let header_bounds = self.bounds.take();
-        self.points = Some(cloud.len() as u64);
-        let finite = (0..cloud.len()).into_par_iter().map(|i| cloud.world_position(i)).filter(|p| p.is_finite());
-        let none = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0_u64);
-        let (min, max, count) = finite
-            .fold(|| none, |(min, max, count), position| (min.min(position), max.max(position), count + 1))
-            .reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2));
-        self.not_finite = Some(cloud.len() as u64 - count);
-        self.bounds = Bounds::new([min, max]);
-        if count > 0 {
-            self.axes = Some(AxesFound::new(guess_axes(cloud), cloud.axes().is_none()));
+        let part = |start: f32, len: f32| Part { whole: progress, start, len };
+        let Surveyed { points, finite, bounds, like, crs, scans, summaries } =
+            survey(clouds, attributes, &part(0.0, 0.2))?;
+        self.points = Some(points);
+        self.not_finite = Some(points - finite);
+        self.bounds = Bounds::new(bounds);
+        if finite > 0 {
+            self.axes = Some(AxesFound::new(guess_axes(&like), like.axes().is_none()));
         }
-        if *cloud.crs() != autosplats_cloud::Crs::default() {
-            self.crs = CrsFound::from(cloud.crs());
+        if crs != Crs::default() {
+            self.crs = CrsFound::from(&crs);
         }
-        self.resolution = cloud.resolution().map(Into::into).or(self.resolution);
+        self.resolution = like.resolution().map(Into::into).or(self.resolution);
         // The reader has already dropped invalid scans.
-        self.scans = cloud.scans().iter().map(ScanFound::from).collect();
-        self.attributes = values_of(cloud, attributes);
+        self.scans = scans;
+        self.attributes = values_of(clouds, &like, attributes, summaries, &part(0.2, 0.2))?;
         self.tidy();
         self.compare(header_bounds);
-        if count == 0 {
-            self.warn(if cloud.is_empty() { "there are no points in it" } else { "no position is finite" }.into());
-            return;
+        if finite == 0 {
+            self.warn(if points == 0 { "there are no points in it" } else { "no position is finite" }.into());
+            return Ok(());
         }
-        if check_memory("", cloud.len() as u64 * spacing::BYTES_PER_POINT).is_err() {
+        if room.is_none() && check_memory("", points * spacing::BYTES_PER_POINT).is_err() {
             self.warn("not enough memory to measure spacing and count duplicates; thin the cloud".into());
-            return;
+            return Ok(());
         }
-        self.duplicates = Some(spacing::duplicates(cloud));
-        if cloud.crs().unit == Some(Unit::Degree) {
+        self.duplicates = Some(match (clouds.whole(), room) {
+            (Some(cloud), _) => spacing::duplicates(cloud),
+            (None, room) => spacing::duplicates_in_parts(clouds, points, room, &part(0.4, 0.1))?,
+        });
+        if crs.unit == Some(Unit::Degree) {
             self.warn("x and y are in degrees, z is not: no spacing or density; project the points to metres".into());
         } else {
-            (self.spacing, self.density) = spacing::measure(cloud);
+            (self.spacing, self.density) = match (clouds.whole(), room) {
+                (Some(cloud), _) => spacing::measure(cloud),
+                (None, room) => spacing::measure_in_parts(clouds, room, &part(0.5, 0.5))?,
+            };
         }
         self.check_digits();
+        Ok(())
     }
 
     /// Rounds coordinates to 15 significant digits. They are sums of an origin and an offset, whose further digits are
@@ -349,10 +378,115 @@ fn plain_name(name: &str) -> String {
     }
 }
 
-/// Statistics of the header's attributes, then of the cloud's other values.
-fn values_of(cloud: &PointCloud, attributes: &[Attribute]) -> Vec<AttributeFound> {
+/// What a first look at all points shows.
+struct Surveyed<'a> {
+    points: u64,
+    finite: u64,
+    bounds: [DVec3; 2],
+    /// All points, or else a sample of them, with all attributes.
+    like: Cow<'a, PointCloud>,
+    crs: Crs,
+    scans: Vec<ScanFound>,
+    /// Of each of the [`rows`] of values.
+    summaries: Vec<Summary>,
+}
+
+/// Points of which one is in the sample of a cloud that comes in parts.
+const SAMPLE_STEP: usize = 64;
+
+fn survey<'a>(
+    clouds: &'a dyn Clouds,
+    attributes: &[Attribute],
+    progress: &dyn Progress,
+) -> Result<Surveyed<'a>, Error> {
+    let none = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0_u64);
+    let join = |a: (DVec3, DVec3, u64), b: (DVec3, DVec3, u64)| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2);
+    let (mut points, mut all) = (0, none);
+    let (mut few, mut crs, mut scans) = (Vec::new(), Crs::default(), Vec::new());
+    let mut summaries: Vec<Summary> = Vec::new();
+    clouds.read(progress, &mut |cloud| {
+        let finite = (0..cloud.len()).into_par_iter().map(|i| cloud.world_position(i)).filter(|p| p.is_finite());
+        let own = finite
+            .fold(|| none, |(min, max, count), position| (min.min(position), max.max(position), count + 1))
+            .reduce(|| none, join);
+        all = join(all, own);
+        points += cloud.len() as u64;
+        crs = cloud.crs().clone();
+        scans.extend(cloud.scans().iter().map(ScanFound::from));
+        let rows = rows(cloud, attributes);
+        summaries.resize(rows.len(), Summary::NONE);
+        for (summary, row) in summaries.iter_mut().zip(&rows) {
+            let values = row.values.map(|place| place.of(cloud));
+            *summary = values.map_or(*summary, |values| summary.and(values.summary()));
+        }
+        if clouds.whole().is_none() {
+            let mut sample = cloud.clone();
+            sample.keep_every(SAMPLE_STEP);
+            few.push(sample);
+        }
+        Ok(())
+    })?;
+    let like = clouds.whole().map_or_else(|| Cow::Owned(PointCloud::joined(few.iter())), Cow::Borrowed);
+    Ok(Surveyed { points, finite: all.2, bounds: [all.0, all.1], like, crs, scans, summaries })
+}
+
+/// An attribute of the report: its name, how it is stored, and where its values are.
+struct Row {
+    name: String,
+    stored: String,
+    values: Option<Place>,
+}
+
+/// Place of values in a cloud.
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    Axis(usize),
+    Channel(usize),
+    Field(usize),
+}
+
+impl Place {
+    fn of(self, cloud: &PointCloud) -> Values<'_> {
+        match self {
+            Self::Axis(axis) => Values::Axis(cloud, axis),
+            Self::Channel(channel) => Values::Channel(cloud.colors().unwrap_or_default(), channel),
+            Self::Field(index) => Values::Field(&cloud.fields()[index].values),
+        }
+    }
+}
+
+/// Statistics of all [`rows`].
+fn values_of(
+    clouds: &dyn Clouds,
+    like: &PointCloud,
+    attributes: &[Attribute],
+    summaries: Vec<Summary>,
+    progress: &dyn Progress,
+) -> Result<Vec<AttributeFound>, Error> {
+    let rows = rows(like, attributes);
+    let mut summaries = summaries;
+    summaries.resize(rows.len(), Summary::NONE);
+    let mut bins: Vec<Option<Bins>> = summaries.iter().map(Summary::bins).collect();
+    clouds.read(progress, &mut |cloud| {
+        for (bins, row) in bins.iter_mut().zip(&rows) {
+            if let (Some(bins), Some(place)) = (bins, row.values) {
+                bins.add(place.of(cloud));
+            }
+        }
+        Ok(())
+    })?;
+    let found = rows.into_iter().zip(summaries).zip(bins).map(|((row, summary), bins)| {
+        let classes = plain_name(&row.name) == "classification";
+        let statistics = row.values.map_or_else(Statistics::default, |_| Statistics::new(&summary, bins, classes));
+        AttributeFound { name: row.name, stored: row.stored, statistics }
+    });
+    Ok(found.collect())
+}
+
+/// The header's attributes, then the cloud's other values.
+fn rows(cloud: &PointCloud, attributes: &[Attribute]) -> Vec<Row> {
     let field_of = |name: &str| cloud.fields().iter().position(|field| plain_name(&field.name) == plain_name(name));
-    let mut rows: Vec<(String, String, Option<Values<'_>>)> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     let mut taken = vec![false; cloud.fields().len()];
     let mut meanings = Vec::new();
     for Attribute { name, stored } in attributes {
@@ -366,46 +500,41 @@ fn values_of(cloud: &PointCloud, attributes: &[Attribute]) -> Vec<AttributeFound
         let values = match (field, known, cloud.colors()) {
             (Some(index), ..) => {
                 taken[index] = true;
-                Some(Values::Field(&cloud.fields()[index].values))
+                Some(Place::Field(index))
             }
-            (None, Some(Meaning::Axis(axis)), _) => Some(Values::Axis(cloud, axis)),
-            (None, Some(Meaning::Channel(channel)), Some(colors)) => Some(Values::Channel(colors, channel)),
+            (None, Some(Meaning::Axis(axis)), _) => Some(Place::Axis(axis)),
+            (None, Some(Meaning::Channel(channel)), Some(_)) => Some(Place::Channel(channel)),
             _ => None,
         };
         meanings.extend(known);
         // Colours of other types were converted to 8 bits by the reader.
-        let bytes = matches!(values, Some(Values::Channel(..)))
-            && (stored.starts_with("uint16") || stored.starts_with("float"));
+        let bytes =
+            matches!(values, Some(Place::Channel(_))) && (stored.starts_with("uint16") || stored.starts_with("float"));
         let stored = if bytes { format!("{stored}, shown as 8 bits") } else { stored.clone() };
-        rows.push((name.clone(), stored, values));
+        rows.push(Row { name: name.clone(), stored, values });
     }
     let mut first = Vec::new();
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         if !meanings.contains(&Meaning::Axis(axis)) {
-            first.push((name.to_owned(), String::new(), Some(Values::Axis(cloud, axis))));
+            first.push(Row { name: name.into(), stored: String::new(), values: Some(Place::Axis(axis)) });
         }
     }
     rows.splice(0..0, first);
     let wide = cloud.fields().iter().any(|field| plain_name(&field.name) == "red");
-    if let Some(colors) = cloud.colors().filter(|_| !wide) {
+    if cloud.colors().is_some() && !wide {
         for (channel, name) in ["red", "green", "blue"].into_iter().enumerate() {
             if !meanings.contains(&Meaning::Channel(channel)) {
-                rows.push((name.into(), "uint8".into(), Some(Values::Channel(colors, channel))));
+                rows.push(Row { name: name.into(), stored: "uint8".into(), values: Some(Place::Channel(channel)) });
             }
         }
     }
-    for (field, taken) in cloud.fields().iter().zip(taken) {
+    for (index, (field, taken)) in cloud.fields().iter().zip(taken).enumerate() {
         if !taken {
-            rows.push((field.name.clone(), type_name(&field.values).into(), Some(Values::Field(&field.values))));
+            let (name, stored) = (field.name.clone(), type_name(&field.values).into());
+            rows.push(Row { name, stored, values: Some(Place::Field(index)) });
         }
     }
-    rows.into_iter()
-        .map(|(name, stored, values)| {
-            let classes = plain_name(&name) == "classification";
-            let statistics = values.map_or_else(Statistics::default, |values| Statistics::of(values, classes));
-            AttributeFound { name, stored, statistics }
-        })
-        .collect()
+    rows
 }
 
 fn type_name(values: &FieldValues) -> &'static str {
@@ -425,8 +554,6 @@ fn type_name(values: &FieldValues) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use autosplats_cloud::Crs;
-
     use super::*;
 
     /// Header of a survey in feet.
@@ -474,7 +601,7 @@ mod tests {
         let warnings = |last| {
             let mut report = Report::default();
             report.describe(&header());
-            report.scan(&cloud(last), &header().attributes);
+            report.scan(&cloud(last), &header().attributes).expect("memory is read");
             report.warnings.join("; ")
         };
         assert_eq!(warnings([100.85, 99.7, 96.59]), "from the header", "as it says");
@@ -486,7 +613,7 @@ mod tests {
     fn degrees_have_no_spacing() {
         let mut report = Report::default();
         let cloud = cloud([1.0; 3]).with_crs(Crs { unit: Some(Unit::Degree), ..Crs::default() });
-        report.scan(&cloud, &[]);
+        report.scan(&cloud, &[]).expect("memory is read");
         assert_eq!(report.spacing, None, "a degree is no height");
         assert!(report.warnings.iter().any(|warning| warning.contains("degrees")), "{:?}", report.warnings);
     }

@@ -3,6 +3,7 @@
 mod examine;
 mod notes;
 mod report;
+mod room;
 mod spacing;
 mod statistics;
 mod text;
@@ -14,19 +15,22 @@ use std::sync::mpsc::channel;
 use autosplats_formats::ReadOptions;
 
 use self::examine::{Examination, Examiner};
+use self::room::Room;
 pub(crate) use self::text::wrapped;
 use crate::args::InfoArgs;
 use crate::console::{Console, json};
 use crate::exit::{Exit, Failure};
+use crate::parts::check_room;
 
 /// Examines the inputs in parallel and prints the reports in the order typed.
 pub(crate) fn run(args: &InfoArgs, console: &Console) -> Result<(), Failure> {
     // All digits are read, so that the report is true of the file.
+    check_room(&args.room)?;
     let options = ReadOptions { exact: true, ..args.reading.options() };
     let several = args.inputs.len() > 1;
     // The header counts the points that are left out too.
     let scan = args.scan || options.keep.as_ref().is_some_and(|filter| !filter.is_all());
-    let examiner = Examiner::new(options, scan, console.quiet(several));
+    let examiner = Examiner::new(options, scan, Room::new(&args.room), console.quiet(several));
 
     let next = AtomicUsize::new(0);
     let (sender, reports) = channel();

@@ -1,11 +1,15 @@
 //! Spacing of points, measured at samples with a k-d tree over all points.
 
-use std::{f64::consts::PI, num::NonZero};
+use std::{collections::HashMap, f64::consts::PI, num::NonZero, sync::Mutex};
 
-use autosplats_cloud::{PointCloud, Random};
+use autosplats_cloud::{
+    Clouds, Error, Part, PointCloud, Progress, Random, Spill, SpillCell, Tile, Tiles, glam::DVec3, lock,
+};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 use serde::Serialize;
+
+use super::room::Room;
 
 /// Memory in bytes per point of the tree, or of the sorting that finds duplicates.
 pub(super) const BYTES_PER_POINT: u64 = 40;
@@ -49,10 +53,8 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
     if points.len() < 2 {
         return (None, None);
     }
-    // One random sample from each of equally many parts, in the file's order.
     let samples = points.len().min(MAX_SAMPLES);
-    let part = |i: usize| (points.len() as u128 * i as u128 / samples as u128) as usize;
-    let sample = |i: usize| part(i) + Random::from_state(i as u64).modulo(part(i + 1) - part(i));
+    let sample = samples_of(points.len());
 
     let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(&points) else { return (None, None) };
     let count = DENSITY_NEIGHBORS.min(points.len() - 1);
@@ -72,6 +74,12 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
         })
         .collect();
 
+    of_distances(distances, count)
+}
+
+/// Spacing and density by the distances to the nearest and to the `count`-th neighbour at each sample.
+fn of_distances(distances: Vec<(f64, f64)>, count: usize) -> (Option<Spacing>, Option<Density>) {
+    let samples = distances.len();
     let mut nearest: Vec<f64> = distances.iter().map(|(nearest, _)| *nearest).collect();
     nearest.sort_unstable_by(f64::total_cmp);
     let at = |fraction: f64| nearest[((nearest.len() - 1) as f64 * fraction).round() as usize];
@@ -86,23 +94,197 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
     (Some(spacing).filter(finite), Some(density).filter(|_| count == DENSITY_NEIGHBORS && median.is_finite()))
 }
 
-/// Number of points at exactly the position of an earlier one, by a 64-bit hash of the coordinates.
-pub(super) fn duplicates(cloud: &PointCloud) -> u64 {
-    let hash = |i: usize| {
-        let position = cloud.world_position(i);
-        // Adding 0 turns -0 into 0.
-        let hash = |hash: u64, value: f64| Random::from_state(hash ^ (value + 0.0).to_bits()).bits();
-        position.is_finite().then(|| position.to_array().into_iter().fold(1, hash))
+/// The numbers of samples among so many points, in order: one random one from each of equally many parts.
+fn samples_of(points: usize) -> impl Fn(usize) -> usize {
+    let samples = points.min(MAX_SAMPLES);
+    let part = move |i: usize| (points as u128 * i as u128 / samples as u128) as usize;
+    move |i| part(i) + Random::from_state(i as u64).modulo(part(i + 1) - part(i))
+}
+
+/// Like [`measure`], of points that come in parts. Where memory holds too few points around a sample to be sure of its
+/// neighbours, it is left out.
+pub(super) fn measure_in_parts(
+    clouds: &dyn Clouds,
+    room: Option<&Room>,
+    progress: &dyn Progress,
+) -> Result<(Option<Spacing>, Option<Density>), Error> {
+    let Some(room) = room else { return Ok((None, None)) };
+    let most = (room.memory() / BYTES_PER_POINT).max(1) as usize;
+    let part = |start: f32, len: f32| Part { whole: progress, start, len };
+    let tiles = Tiles::new(clouds, (most / 4).max(1), &room.folder, room.memory() / 8, &part(0.0, 0.4))?;
+    let points = tiles.points() as usize;
+    if points < 2 {
+        return Ok((None, None));
+    }
+    let sample = samples_of(points);
+    let count = DENSITY_NEIGHBORS.min(points - 1);
+    let wanted: Vec<usize> = (0..points.min(MAX_SAMPLES)).map(sample).collect();
+    let own = indices_of(clouds, &tiles, &wanted, &part(0.4, 0.1))?;
+    // The index of each sample that is sure of its neighbours, then their indices.
+    let mut found: Vec<Vec<u64>> = Vec::new();
+    for number in 0..tiles.len() {
+        progress.tick(0.5 + 0.4 * number as f32 / tiles.len() as f32)?;
+        let Some(tile) = tiles.load(number, 0.0, most)? else { continue };
+        let (mut sure, need) = neighbors(&tile, tiles.area(number), &own, count);
+        if need > 0.0
+            && let Some(wider) = tiles.load(number, need, most)?
+        {
+            sure = neighbors(&wider, tiles.area(number), &own, count).0;
+        }
+        found.append(&mut sure);
+    }
+    let places = places_of(clouds, found.iter().flatten().copied().collect(), &part(0.9, 0.1))?;
+    let distances = found.iter().filter_map(|indices| {
+        let own = places.get(&indices[0])?;
+        let mut exact: Vec<f64> =
+            indices[1..].iter().filter_map(|other| Some(places.get(other)?.distance(*own))).collect();
+        exact.sort_unstable_by(f64::total_cmp);
+        Some((*exact.first()?, *exact.get(count - 1)?))
+    });
+    let distances: Vec<(f64, f64)> = distances.collect();
+    Ok(if distances.is_empty() { (None, None) } else { of_distances(distances, count) })
+}
+
+/// The indices of points by their numbers among those with a finite position. `wanted` does not fall.
+fn indices_of(
+    clouds: &dyn Clouds,
+    tiles: &Tiles,
+    wanted: &[usize],
+    progress: &dyn Progress,
+) -> Result<Vec<u64>, Error> {
+    let (mut indices, mut number, mut index) = (Vec::with_capacity(wanted.len()), 0, 0_u64);
+    clouds.read(progress, &mut |cloud| {
+        for i in 0..cloud.len() {
+            if tiles.has(cloud, i) {
+                while wanted.get(indices.len()) == Some(&number) {
+                    indices.push(index + i as u64);
+                }
+                number += 1;
+            }
+        }
+        index += cloud.len() as u64;
+        Ok(())
+    })?;
+    Ok(indices)
+}
+
+/// The neighbours of the samples in a tile that are sure of them, and the halo that the others need.
+fn neighbors(tile: &Tile, area: [[f32; 3]; 2], samples: &[u64], count: usize) -> (Vec<Vec<u64>>, f32) {
+    let own =
+        tile.points.iter().enumerate().filter(|(_, point)| point.is_own && samples.binary_search(&point.index).is_ok());
+    let own: Vec<usize> = own.map(|(place, _)| place).collect();
+    let positions: Vec<[f32; 3]> = tile.points.iter().map(|point| point.position).collect();
+    let infinite = || (Vec::new(), f32::INFINITY);
+    if own.is_empty() {
+        return (Vec::new(), 0.0);
+    }
+    if positions.len() <= count {
+        return infinite();
+    }
+    let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(&positions) else { return infinite() };
+    let asked = NonZero::<usize>::MIN.saturating_add(count);
+    let inside = |place: usize, [low, high]: [[f32; 3]; 2]| {
+        let position = positions[place];
+        let along = |axis: usize| (position[axis] - low[axis]).min(high[axis] - position[axis]);
+        along(0).min(along(1)).min(along(2))
     };
-    let mut hashes: Vec<u64> = (0..cloud.len()).into_par_iter().filter_map(hash).collect();
+    let each = own.par_iter().map(|&place| {
+        let found = tree.query(&positions[place]).nearest_n::<SquaredEuclidean<f32>>(asked).execute();
+        let others: Vec<usize> =
+            found.iter().map(|found| found.item as usize).filter(|&i| i != place).take(count).collect();
+        let apart = |&other: &usize| {
+            let along = |axis: usize| positions[other][axis] - positions[place][axis];
+            (along(0).powi(2) + along(1).powi(2) + along(2).powi(2)).sqrt()
+        };
+        // Rounding must not hide a neighbour.
+        let reach = others.iter().map(apart).fold(0.0, f32::max) * 1.001;
+        if reach < inside(place, tile.known) {
+            let indices = std::iter::once(place).chain(others).map(|place| tile.points[place].index);
+            (Some(indices.collect()), 0.0)
+        } else {
+            (None, reach - inside(place, area).min(reach))
+        }
+    });
+    let (sure, needs): (Vec<Option<Vec<u64>>>, Vec<f32>) = each.unzip();
+    (sure.into_iter().flatten().collect(), needs.into_iter().fold(0.0, f32::max))
+}
+
+/// The positions of points by their indices.
+fn places_of(clouds: &dyn Clouds, mut wanted: Vec<u64>, progress: &dyn Progress) -> Result<HashMap<u64, DVec3>, Error> {
+    wanted.sort_unstable();
+    wanted.dedup();
+    let mut places = HashMap::with_capacity(wanted.len());
+    let (mut next, mut first) = (0, 0);
+    clouds.read(progress, &mut |cloud| {
+        let end = first + cloud.len() as u64;
+        while let Some(&index) = wanted.get(next).filter(|&&index| index < end) {
+            places.insert(index, cloud.world_position((index - first) as usize));
+            next += 1;
+        }
+        first = end;
+        Ok(())
+    })?;
+    Ok(places)
+}
+
+/// A 64-bit hash of a position; `None` if it is not finite.
+fn hash(position: DVec3) -> Option<u64> {
+    // Adding 0 turns -0 into 0.
+    let hash = |hash: u64, value: f64| Random::from_state(hash ^ (value + 0.0).to_bits()).bits();
+    position.is_finite().then(|| position.to_array().into_iter().fold(1, hash))
+}
+
+/// Number of hashes that are there already.
+fn repeated(mut hashes: Vec<u64>) -> u64 {
     hashes.par_sort_unstable();
     hashes.par_windows(2).filter(|pair| pair[0] == pair[1]).count() as u64
 }
 
+/// Like [`duplicates`], of points that come in parts: hashes that begin alike wait together on the disk.
+pub(super) fn duplicates_in_parts(
+    clouds: &dyn Clouds,
+    points: u64,
+    room: Option<&Room>,
+    progress: &dyn Progress,
+) -> Result<u64, Error> {
+    let Some(room) = room else { return Ok(0) };
+    let parts = (points * 8).div_ceil((room.memory() / 4).max(1)).clamp(1, 1 << 12) as usize;
+    let mut cells: Vec<Mutex<SpillCell>> = Vec::new();
+    cells.resize_with(parts, Mutex::default);
+    let spill = Spill::new(&room.folder, 8, parts, (room.memory() / 4) as usize)?;
+    clouds.read(progress, &mut |cloud| {
+        let mut hashes: Vec<u64> =
+            (0..cloud.len()).into_par_iter().filter_map(|i| hash(cloud.world_position(i))).collect();
+        let part = |hash: u64| ((u128::from(hash) * parts as u128) >> 64) as usize;
+        hashes.par_sort_unstable();
+        hashes.chunk_by(|&a, &b| part(a) == part(b)).try_for_each(|own| {
+            let records: Vec<u8> = own.iter().flat_map(|hash| hash.to_le_bytes()).collect();
+            spill.append(&cells, part(own[0]), &records)
+        })
+    })?;
+    let mut all = 0;
+    for cell in cells {
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let cell = std::mem::take(&mut *lock(&cell));
+        let mut hashes = Vec::with_capacity(cell.count as usize);
+        spill.take(cell, |records| {
+            hashes.extend(records.as_chunks().0.iter().map(|hash| u64::from_le_bytes(*hash)));
+            Ok(())
+        })?;
+        all += repeated(hashes);
+    }
+    Ok(all)
+}
+
+/// Number of points at exactly the position of an earlier one, by a 64-bit hash of the coordinates.
+pub(super) fn duplicates(cloud: &PointCloud) -> u64 {
+    repeated((0..cloud.len()).into_par_iter().filter_map(|i| hash(cloud.world_position(i))).collect())
+}
+
 #[cfg(test)]
 mod tests {
-    use autosplats_cloud::glam::DVec3;
-
     use super::*;
 
     #[test]

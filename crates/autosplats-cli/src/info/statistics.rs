@@ -53,14 +53,65 @@ pub(super) struct Histogram {
     pub(super) counts: Vec<u64>,
 }
 
-/// Sums over the finite values of a block.
+/// Sums over the finite values of some points.
 #[derive(Clone, Copy, Debug)]
-struct Summary {
+pub(super) struct Summary {
     min: f64,
     max: f64,
     sum: f64,
     count: u64,
     whole: bool,
+    /// Number of values, finite or not.
+    len: u64,
+}
+
+impl Summary {
+    pub(super) const NONE: Self =
+        Self { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0, count: 0, whole: true, len: 0 };
+
+    pub(super) fn and(self, other: Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+            sum: self.sum + other.sum,
+            count: self.count + other.count,
+            whole: self.whole && other.whole,
+            len: self.len + other.len,
+        }
+    }
+
+    /// How values with this summary are counted; `None` if there are none, or if their range exceeds all numbers.
+    pub(super) fn bins(&self) -> Option<Bins> {
+        let range = self.max - self.min;
+        if self.count == 0 || !range.is_finite() {
+            return None;
+        }
+        let each = self.whole && range < MAX_COUNTED_RANGE;
+        let count = if each { range as usize + 1 } else { MAX_BINS };
+        Some(Bins { min: self.min, range, each, counts: vec![0; count] })
+    }
+}
+
+/// Numbers of values in equal bins: of each whole value, or of parts of the range.
+#[derive(Clone, Debug)]
+pub(super) struct Bins {
+    min: f64,
+    range: f64,
+    each: bool,
+    counts: Vec<u64>,
+}
+
+impl Bins {
+    /// Counts more values.
+    pub(super) fn add(&mut self, values: Values<'_>) {
+        let (min, range) = (self.min, self.range);
+        let counts = if self.each {
+            values.count(self.counts.len(), |value| (value - min) as usize)
+        } else {
+            values.count(MAX_BINS, |value| ((value - min) / range * MAX_BINS as f64) as usize)
+        };
+        self.counts.iter_mut().zip(counts).for_each(|(count, more)| *count += more);
+    }
 }
 
 impl Values<'_> {
@@ -108,12 +159,11 @@ impl Values<'_> {
             .map(move |block| block * BLOCK_POINTS..((block + 1) * BLOCK_POINTS).min(len))
     }
 
-    fn summary(self) -> Summary {
-        let none = Summary { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0, count: 0, whole: true };
+    pub(super) fn summary(self) -> Summary {
         let blocks: Vec<Summary> = self
             .blocks()
             .map(|points| {
-                let mut all = none;
+                let mut all = Summary { len: points.len() as u64, ..Summary::NONE };
                 self.each(points, |value| {
                     all.min = all.min.min(value);
                     all.max = all.max.max(value);
@@ -124,13 +174,7 @@ impl Values<'_> {
                 all
             })
             .collect();
-        blocks.into_iter().fold(none, |a, b| Summary {
-            min: a.min.min(b.min),
-            max: a.max.max(b.max),
-            sum: a.sum + b.sum,
-            count: a.count + b.count,
-            whole: a.whole && b.whole,
-        })
+        blocks.into_iter().fold(Summary::NONE, Summary::and)
     }
 
     /// Counts the values of each of `bins`.
@@ -148,14 +192,13 @@ impl Values<'_> {
 }
 
 impl Statistics {
-    /// Computes the statistics of all values. `classes` marks the values as point classes.
-    pub(super) fn of(values: Values<'_>, classes: bool) -> Self {
-        let Summary { min, max, sum, count, whole } = values.summary();
-        let not_finite = Some(values.len() as u64 - count);
-        let range = max - min;
-        if count == 0 || !range.is_finite() {
+    /// The statistics of values with this summary, and of their counts. `classes` marks the values as point classes.
+    pub(super) fn new(summary: &Summary, bins: Option<Bins>, classes: bool) -> Self {
+        let Summary { min, max, sum, count, len, .. } = *summary;
+        let not_finite = Some(len - count);
+        let Some(Bins { range, each, counts, .. }) = bins else {
             return Self { not_finite, ..Self::default() };
-        }
+        };
         let mut statistics = Self {
             min: Some(min),
             max: Some(max),
@@ -164,12 +207,11 @@ impl Statistics {
             not_finite,
             ..Self::default()
         };
-        if whole && range < MAX_COUNTED_RANGE {
-            let each = values.count(range as usize + 1, |value| (value - min) as usize);
-            let distinct = each.iter().filter(|count| **count > 0).count();
+        if each {
+            let distinct = counts.iter().filter(|count| **count > 0).count();
             statistics.distinct = Some(distinct);
             if classes || distinct <= MAX_LISTED_VALUES {
-                let listed = each.iter().enumerate().filter(|(_, count)| **count > 0);
+                let listed = counts.iter().enumerate().filter(|(_, count)| **count > 0);
                 let name = |value: f64| classes.then(|| class_name(value)).flatten();
                 statistics.values = listed
                     .map(|(offset, &count)| {
@@ -178,12 +220,11 @@ impl Statistics {
                     })
                     .collect();
             }
-            let width = each.len().div_ceil(MAX_BINS);
-            let counts: Vec<u64> = each.chunks(width).map(|bin| bin.iter().sum()).collect();
+            let width = counts.len().div_ceil(MAX_BINS);
+            let counts: Vec<u64> = counts.chunks(width).map(|bin| bin.iter().sum()).collect();
             let edges = (0..=counts.len()).map(|edge| min + (edge * width) as f64).collect();
             statistics.histogram = Some(Histogram { edges, counts });
         } else {
-            let counts = values.count(MAX_BINS, |value| ((value - min) / range * MAX_BINS as f64) as usize);
             let edges = (0..=MAX_BINS)
                 .map(|edge| if edge == MAX_BINS { max } else { min + range * edge as f64 / MAX_BINS as f64 });
             statistics.histogram = Some(Histogram { edges: edges.collect(), counts });
@@ -196,10 +237,17 @@ impl Statistics {
 mod tests {
     use super::*;
 
+    fn of(values: Values<'_>, classes: bool) -> Statistics {
+        let summary = values.summary();
+        let mut bins = summary.bins();
+        bins.iter_mut().for_each(|bins| bins.add(values));
+        Statistics::new(&summary, bins, classes)
+    }
+
     #[test]
     fn whole_numbers_are_counted_each() {
         let classes = FieldValues::U8(vec![2, 2, 6, 2, 65]);
-        let found = Statistics::of(Values::Field(&classes), true);
+        let found = of(Values::Field(&classes), true);
         assert_eq!([found.min, found.max, found.mean], [Some(2.0), Some(65.0), Some(15.4)], "least, greatest, mean");
         assert_eq!(found.distinct, Some(3), "three classes");
         let listed: Vec<_> = found.values.iter().map(|v| (v.value, v.count, v.name.unwrap_or_default())).collect();
@@ -212,7 +260,7 @@ mod tests {
     #[test]
     fn floats_are_binned() {
         let values: Vec<f32> = (0..200_000).map(|i| (i % 64) as f32 / 64.0).chain([f32::NAN, f32::INFINITY]).collect();
-        let found = Statistics::of(Values::Field(&FieldValues::F32(values)), false);
+        let found = of(Values::Field(&FieldValues::F32(values)), false);
         assert_eq!((found.not_finite, found.max), (Some(2), Some(63.0 / 64.0)), "what is no number is left out");
         let histogram = found.histogram.expect("there are values");
         assert_eq!((histogram.edges.len(), histogram.counts.len()), (33, 32), "edges around bins");
@@ -222,7 +270,7 @@ mod tests {
 
     #[test]
     fn nothing_and_extremes() {
-        let of = |values: Vec<f64>| Statistics::of(Values::Field(&FieldValues::F64(values)), false);
+        let of = |values: Vec<f64>| of(Values::Field(&FieldValues::F64(values)), false);
         assert_eq!(of(vec![]), Statistics { not_finite: Some(0), ..Statistics::default() }, "no points");
         assert_eq!(of(vec![f64::NAN]).min, None, "no number");
         assert_eq!(of(vec![f64::MAX, f64::MIN]).histogram, None, "a range beyond all numbers");

@@ -302,3 +302,36 @@ fn hostile_files_are_named_each() {
     assert_eq!(outcome.stderr.lines().count(), bad + 1, "a line for each and one for all: {}", outcome.stderr);
     assert!(bad > 5 && bad < paths.len(), "{bad} of {} are bad", paths.len());
 }
+
+/// Whether two values are the same, but for the last digits of sums.
+fn alike(a: &serde_json::Value, b: &serde_json::Value) -> bool {
+    use serde_json::Value::{Array, Number, Object};
+    match (a, b) {
+        (Number(a), Number(b)) => {
+            let [a, b] = [a, b].map(|number| number.as_f64().expect("a number"));
+            (a - b).abs() <= 1e-9 * a.abs()
+        }
+        (Array(a), Array(b)) => a.len() == b.len() && a.iter().zip(b).all(|(a, b)| alike(a, b)),
+        (Object(a), Object(b)) => {
+            a.len() == b.len() && a.iter().all(|(name, a)| b.get(name).is_some_and(|b| alike(a, b)))
+        }
+        (a, b) => a == b,
+    }
+}
+
+#[test]
+fn more_points_than_memory_holds_are_examined_in_parts() {
+    let folder = Folder::new();
+    folder.succeed(&["convert", "scene:figure:100K", "scan.laz"]);
+    let scan = |options: &[&str]| -> serde_json::Value {
+        let outcome = folder.succeed(&[&["info", "scan.laz", "--scan", "--json"], options].concat());
+        serde_json::from_str(&outcome.stdout).expect("JSON")
+    };
+    let (whole, parts) = (scan(&[]), scan(&["--memory", "5M"]));
+    for (name, value) in whole.as_object().expect("an object") {
+        assert!(alike(value, &parts[name]), "{name}: {value} and {}", parts[name]);
+    }
+    assert_eq!(parts["duplicates"], whole["duplicates"]);
+    assert_eq!(parts["spacing"]["samples"], 10_000, "all samples are sure of their neighbours");
+    folder.fail(&["info", "scan.laz", "--temp", "nowhere"], 4, &["nowhere"]);
+}
