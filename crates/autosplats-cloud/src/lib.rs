@@ -77,5 +77,5 @@ pub use scale::computing_scale_of;
 pub use spill::{Spill, SpillCell, lock};
 pub use spool::Spool;
 pub use thinned::{Thinned, Thinning};
-pub use tiles::{Tile, TilePoint, Tiles};
+pub use tiles::{Tile, TilePoint, Tiles, sampled_median};
 pub use tree::{Key, Node, NodeKey, Tree, TreeInfo, Wanted};

@@ -16,6 +16,9 @@ use crate::{Clouds, Error, PointCloud, Progress, Spill, SpillCell, lock, progres
 /// Points of the sample by which space is divided.
 const SAMPLE: usize = 1 << 18;
 
+/// Points at least of which a [`sampled_median`] is that of all.
+const MEDIAN_SAMPLE: u64 = 1 << 16;
+
 /// Largest absolute coordinate of a point. Squared distances of larger ones exceed `f32`.
 const MAX_COORDINATE: f32 = 1e18;
 
@@ -173,6 +176,32 @@ impl Sampler {
     }
 }
 
+/// Every so many of some points make a sample of `sample` to twice as many: a power of two.
+fn step_of(points: u64, sample: u64) -> u64 {
+    let mut step = 1;
+    while points.div_ceil(step) > 2 * sample {
+        step *= 2;
+    }
+    step
+}
+
+/// The median of each coordinate of some of the points, evenly taken from all; zero without points.
+///
+/// # Examples
+///
+/// ```
+/// assert_eq!(autosplats_cloud::sampled_median(3, |i| [[0.0, 5.0, 1.0], [1.0, 4.0, 9.0], [2.0, 6.0, 2.0]][i]), [1.0, 5.0, 2.0]);
+/// ```
+pub fn sampled_median(points: usize, position: impl Fn(usize) -> [f32; 3]) -> [f32; 3] {
+    let step = step_of(points as u64, MEDIAN_SAMPLE) as usize;
+    let sample: Vec<[f32; 3]> = (0..points).step_by(step).map(position).collect();
+    [0, 1, 2].map(|axis: usize| {
+        let mut values: Vec<f32> = sample.iter().map(|point| point[axis]).collect();
+        let half = values.len() / 2;
+        if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(half, f32::total_cmp).1 }
+    })
+}
+
 /// Positions about an origin.
 fn about(origin: DVec3, cloud: &PointCloud, index: usize) -> [f32; 3] {
     if cloud.origin() == origin {
@@ -217,11 +246,8 @@ impl Tiles {
         })?;
         let origin = origin.unwrap_or_default();
         let sample: Vec<[f32; 3]> = sampler.points.into_iter().map(|(_, position)| position).collect();
-        let middle = [0, 1, 2].map(|axis| {
-            let mut values: Vec<f32> = sample.iter().map(|point| point[axis]).collect();
-            let half = values.len() / 2;
-            if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(half, f32::total_cmp).1 }
-        });
+        let step = (step_of(points, MEDIAN_SAMPLE) / sampler.step) as usize;
+        let middle = sampled_median(sample.len().div_ceil(step), |i| sample[i * step]);
         let part = sample.len() as f64 / points.max(1) as f64;
         let splits = Splits::new(sample, most as f64 * part);
         let mut cells = Vec::new();
@@ -286,7 +312,7 @@ impl Tiles {
         self.origin
     }
 
-    /// The median of each coordinate of a sample, about the origin.
+    /// The [`sampled_median`] of all points, about the origin.
     pub fn middle(&self) -> [f32; 3] {
         self.middle
     }
@@ -402,6 +428,8 @@ mod tests {
         let finite = |i: &u64| is_finite(cloud.positions()[*i as usize]);
         assert_eq!(found, (0..20_000).filter(finite).collect::<Vec<u64>>());
         assert_eq!((tiles.points(), tiles.all()), (found.len() as u64, 20_000));
+        let finite: Vec<[f32; 3]> = found.iter().map(|&i| cloud.positions()[i as usize]).collect();
+        assert_eq!(tiles.middle(), sampled_median(finite.len(), |i| finite[i]));
     }
 
     #[test]
@@ -420,6 +448,17 @@ mod tests {
             }
         }
         assert!(tiles.load(0, f32::INFINITY, 1000).expect("the file is there").is_none(), "too many");
+    }
+
+    #[test]
+    fn samples_are_neither_small_nor_large() {
+        let mut sampler = Sampler { step: 1, points: Vec::new() };
+        let count = 5 * SAMPLE as u64;
+        (0..count).for_each(|i| sampler.add(i, [i as f32, 0.0, 0.0]));
+        let found: Vec<u64> = sampler.points.iter().map(|(index, _)| *index).collect();
+        assert_eq!(sampler.step, step_of(count, SAMPLE as u64));
+        assert_eq!(found, (0..count).step_by(sampler.step as usize).collect::<Vec<_>>());
+        assert!((SAMPLE..=2 * SAMPLE).contains(&found.len()), "{} points", found.len());
     }
 
     #[test]

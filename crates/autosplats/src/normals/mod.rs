@@ -31,7 +31,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{PointCloud, Progress};
+use autosplats_cloud::{PointCloud, Progress, sampled_median};
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -82,7 +82,7 @@ pub enum Orientation {
     Viewpoints(Vec<Viewpoint>),
     /// Towards this direction, of any length but zero. Up is right for aerial scans.
     Direction(DVec3),
-    /// Away from the middle of the cloud: the median of each coordinate, to within sixteen points. Right for a single
+    /// Away from the middle of the cloud: the median of each coordinate of a sample. Right for a single
     /// body seen from all around.
     Outward,
 }
@@ -228,9 +228,15 @@ fn estimate_at_scale(
     let ticker = Ticker::new(progress);
     ticker.tick(0.0)?;
     let points = finite_points(cloud);
+    let middle = middle.unwrap_or_else(|| {
+        sampled_median(points.len(), |i| {
+            let [x, y, z, _] = points[i].0;
+            [x, y, z]
+        })
+    });
     ticker.tick(LISTED_PROGRESS)?;
     let tree = Tree::build(points, &|part| ticker.tick(LISTED_PROGRESS + (BUILT_PROGRESS - LISTED_PROGRESS) * part))?;
-    let sides = sides.about(middle.unwrap_or_else(|| tree.middle()));
+    let sides = sides.about(middle);
     let output = Output::new(cloud.len());
     let k = settings.k.min((tree.len as u32).saturating_sub(1));
     let job = Job { tree: &tree, sides: &sides, k, output: &output };

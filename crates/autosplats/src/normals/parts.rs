@@ -71,7 +71,6 @@ pub struct NormalsInParts {
 
 /// Estimates like [`estimate_normals`](super::estimate_normals), in bounded memory. The points are read twice. Their
 /// normals have the bits of any other run, but not always those of `estimate_normals`, which adds in another order.
-/// Outward is away from the median of a sample of the points.
 ///
 /// # Errors
 /// Those of `estimate_normals`, of reading and of the operating system, and out of memory if too many points are at one

@@ -99,15 +99,6 @@ impl Tree {
         Ok(Self { len: points.len(), leaves, levels })
     }
 
-    /// The median of each coordinate of one point per leaf; the origin without points.
-    pub(super) fn middle(&self) -> [f32; 3] {
-        [0, 1, 2].map(|axis: usize| {
-            let mut coordinates: Vec<f32> = self.leaves.iter().map(|leaf| leaf.position[axis].0[0]).collect();
-            let half = coordinates.len() / 2;
-            if coordinates.is_empty() { 0.0 } else { *coordinates.select_nth_unstable_by(half, f32::total_cmp).1 }
-        })
-    }
-
     pub(super) fn root(&self) -> Node {
         (self.levels.len(), 0)
     }
