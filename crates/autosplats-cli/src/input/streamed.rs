@@ -3,10 +3,11 @@
 use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use autosplats_cloud::glam::DMat4;
-use autosplats_cloud::{Error, PointCloud, Progress};
-use autosplats_formats::{Clouds, TreeInput};
+use autosplats_cloud::{Error, Part, PointCloud, Progress};
+use autosplats_formats::{Clouds, Parts, TreeInput, open_parts};
 use autosplats_scenes::Scene;
 use autosplats_sources::{Input, Source};
 
@@ -26,6 +27,9 @@ fn streamed(input: &Input) -> TreeInput<'_> {
     let plain = input.world_from_input == DMat4::IDENTITY && !is_made(input);
     match &input.source {
         Source::File(path) if plain && is_las(path) => TreeInput::Las(path.clone()),
+        Source::File(path) if plain && !input.moves() => {
+            TreeInput::Clouds(Box::new(FileClouds { input, path, parts: OnceLock::new() }))
+        }
         Source::Scene(scene, count) if plain && !input.moves() => {
             TreeInput::Clouds(Box::new(SceneClouds { name: &input.name, scene, count: *count }))
         }
@@ -37,6 +41,44 @@ fn streamed(input: &Input) -> TreeInput<'_> {
 fn is_las(path: &Path) -> bool {
     let mut start = [0; 4];
     File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *b"LASF"
+}
+
+/// Share of reading a file for the first time that settling takes what all its points tell.
+const SETTLING: f32 = 0.5;
+
+/// A file that is read in parts if its format allows it.
+struct FileClouds<'a> {
+    input: &'a Input,
+    path: &'a Path,
+    /// Set once the file is opened: `None` if it is read whole.
+    parts: OnceLock<Option<Parts>>,
+}
+
+impl Clouds for FileClouds<'_> {
+    fn name(&self) -> &Path {
+        Path::new(&self.input.name)
+    }
+
+    fn read(
+        &self,
+        progress: &dyn Progress,
+        take: &(dyn Fn(&PointCloud) -> Result<(), Error> + Sync),
+    ) -> Result<(), Error> {
+        let mut start = 0.0;
+        let parts = match self.parts.get() {
+            Some(parts) => parts,
+            None => {
+                let settling = Part { whole: progress, start, len: SETTLING };
+                let parts = open_parts(self.path, &self.input.options, &settling)?;
+                start = if parts.is_some() { SETTLING } else { 0.0 };
+                self.parts.get_or_init(|| parts)
+            }
+        };
+        match parts {
+            Some(parts) => Clouds::read(parts, &Part { whole: progress, start, len: 1.0 - start }, take),
+            None => Whole(self.input).read(progress, take),
+        }
+    }
 }
 
 /// An input that is read whole.
