@@ -25,7 +25,8 @@ Examples:
   autosplats convert tiles/*.laz -o city.copc.laz --memory 4G --temp /scratch
 
 A name that ends in .copc.laz makes an octree. About as much disk as the uncompressed points take is used for a while.
-LAS, LAZ, COPC and scenes may be larger than memory; other inputs are read whole, one at a time.";
+LAS, LAZ, COPC, PLY, PCD, E57, text and scenes may be larger than memory. Meshes, compressed PCD, what gzip compressed
+and other formats are read whole, one at a time.";
 
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_EXAMPLES, override_usage = "autosplats convert [OPTIONS] <INPUT>... <OUT>")]

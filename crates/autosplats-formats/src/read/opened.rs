@@ -29,11 +29,10 @@ fn stamp(metadata: &Metadata) -> Stamp {
 }
 
 impl Opened {
-    /// The file without its first bytes, to be read in pieces of about `piece` bytes.
-    pub(super) fn new(path: &Path, before: usize, piece: usize) -> Result<Self, Error> {
-        let metadata = path.metadata().map_err(|source| Error::Io { path: path.into(), source })?;
+    /// The file without its first bytes, to be read in pieces of about `piece` bytes. It shall stay as `metadata` tells.
+    pub(super) fn new(path: &Path, metadata: &Metadata, before: usize, piece: usize) -> Self {
         let len = usize::try_from(metadata.len()).unwrap_or(usize::MAX).saturating_sub(before);
-        Ok(Self { path: path.into(), stamp: stamp(&metadata), before, len, piece })
+        Self { path: path.into(), stamp: stamp(metadata), before, len, piece }
     }
 
     /// Opens the file again.

@@ -104,7 +104,8 @@ pub fn open_parts_of(
 ) -> Result<Option<Parts>, Error> {
     let io = |source| Error::Io { path: path.into(), source };
     // What is no file can be read only once.
-    if !path.metadata().map_err(io)?.is_file() {
+    let metadata = path.metadata().map_err(io)?;
+    if !metadata.is_file() {
         return Ok(None);
     }
     let map = Bytes::open(path).map_err(io)?;
@@ -112,7 +113,7 @@ pub fn open_parts_of(
         return Ok(None);
     }
     let Unmarked { bytes: std::borrow::Cow::Borrowed(bytes), .. } = Unmarked::of(&map)? else { return Ok(None) };
-    let file = Opened::new(path, map.len() - bytes.len(), part.max(1))?;
+    let file = Opened::new(path, &metadata, map.len() - bytes.len(), part.max(1));
     let job = Job { path, progress, bytes, options, triangles: false };
     job.tick(0.0)?;
     let format = registry::format(&job)?;

@@ -99,7 +99,8 @@ fn check(path: &Path, options: &ReadOptions) -> bool {
     let notes = Notes::default();
     let whole = read_with(path, options, &notes);
     let notes = notes.sorted();
-    for size in SIZES {
+    let len = std::fs::metadata(path).unwrap().len();
+    for size in SIZES.into_iter().filter(|size| len < 1000 * *size as u64) {
         let what = format!("{} in parts of {size} bytes, {options:?}", path.display());
         let own = Notes::default();
         let parts = match (open_parts_of(path, options, size, &own), &whole) {
@@ -117,7 +118,7 @@ fn check(path: &Path, options: &ReadOptions) -> bool {
         let whole = whole.as_ref().unwrap_or_else(|error| panic!("{what}: no error, but {error}"));
         assert_eq!(own.sorted(), notes, "{what}: notes");
         // Parts are the same each time.
-        for _ in 0..if size == SIZES[1] { 2 } else { 1 } {
+        for _ in 0..if size == SIZES[1] && len < 100_000 { 2 } else { 1 } {
             let again = Notes::default();
             let mut clouds = Vec::new();
             parts

@@ -158,7 +158,7 @@ fn survey(
     let mut at = section.start;
     let mut enough = false;
     while at < section.end && !enough {
-        if groups.last().is_none_or(|group| at - group.range.start >= GROUP) {
+        if groups.last().is_none_or(|group| at - group.range.start >= pages.step(GROUP)) {
             job.go_on()?;
             groups.push(Group { range: at..at, filled: filled.clone() });
         }

@@ -15,8 +15,8 @@ const CHECKSUM: usize = 4;
 /// Bytes of the file's header.
 const HEADER: usize = 48;
 
-/// Pages verified between two checks for cancellation.
-const BLOCK: usize = 1 << 15;
+/// Bytes of pages verified between two checks for cancellation.
+const BLOCK: usize = 1 << 25;
 
 /// The pages of a file, and the place of its XML.
 #[derive(Clone, Copy)]
@@ -87,6 +87,11 @@ impl<'a> Pages<'a> {
         Pages { data: Data::Held { bytes: &[], first: 0 }, total, size, version, xml, claimed }
     }
 
+    /// Bytes that are read at a time, at most `most`.
+    pub(super) fn step(&self, most: usize) -> usize {
+        if let Data::File(file) = self.data { file.piece().min(most) } else { most }
+    }
+
     /// The same pages, of which those of a logical range are in memory. `space` is used if they were not.
     pub(super) fn near<'b>(&'b self, range: Range<usize>, space: &'b mut Vec<u8>) -> Result<Pages<'b>, Error> {
         let Data::File(file) = self.data else { return Ok(*self) };
@@ -150,7 +155,7 @@ impl<'a> Pages<'a> {
     pub(super) fn check(&self, job: &Job<'_>, range: Range<usize>) -> Result<(), Error> {
         let data = self.size - CHECKSUM;
         let pages = range.start / data..range.end.div_ceil(data).min(self.total / self.size);
-        let step = if let Data::File(file) = self.data { (file.piece() / self.size).max(1) } else { BLOCK };
+        let step = (self.step(BLOCK) / self.size).max(1);
         let mut space = Vec::new();
         for start in pages.clone().step_by(step) {
             job.go_on()?;
