@@ -6,7 +6,7 @@
 //! settled first, from the same samples and counts as if the file was read whole. Then the points can be passed on
 //! again and again, a few at a time, and are the same.
 
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
 use autosplats_cloud::{Bytes, Error, LeftOut, PointCloud, PointFilter, Progress, Unmarked};
 
@@ -62,8 +62,8 @@ struct Chosen {
 }
 
 /// Opens a file to read it in parts. They are the points that [`read_with`](crate::read_with) returns, about the same
-/// origin and with the same attributes. All points may be read once or twice before, for what is decided by all of
-/// them; notes are given then.
+/// origin and with the same attributes. Opening reads all points one to four times, because much is decided by all of
+/// them. Notes are given then.
 ///
 /// `None` for a file that has to be read whole: of a format other than PLY, PCD, text and E57; with triangles, or lists
 /// beside the coordinates; compressed; in UTF-16; and what is no file, such as a pipe. Nothing is noted of it.
@@ -112,7 +112,7 @@ pub fn open_parts_of(
     if map.starts_with(GZIP) {
         return Ok(None);
     }
-    let Unmarked { bytes: std::borrow::Cow::Borrowed(bytes), .. } = Unmarked::of(&map)? else { return Ok(None) };
+    let Unmarked { bytes: Cow::Borrowed(bytes), .. } = Unmarked::of(&map)? else { return Ok(None) };
     let file = Opened::new(path, &metadata, map.len() - bytes.len(), part.max(1));
     let job = Job { path, progress, bytes, options, triangles: false };
     job.tick(0.0)?;

@@ -6,7 +6,7 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Error, FieldValues, PointCloud, PointFilter, Progress, Scan,
+    Error, FieldValues, PointCloud, PointFilter, Progress, Random, Scan,
     glam::{DMat4, DQuat, DVec3},
 };
 use autosplats_formats::{Clouds, ReadOptions, open_parts, open_parts_of, read_with, write};
@@ -505,6 +505,42 @@ fn e57_of_every_kind() {
     let many = PointCloud::new(DVec3::ZERO, positions(200_000));
     let exact = ReadOptions { exact: true, ..ReadOptions::default() };
     assert!(check_bytes_with("many.e57", &bytes_of(&many), &[exact]));
+}
+
+#[test]
+fn damaged_files_are_read_or_fail_alike() {
+    let few: Vec<Vec<f64>> = rows(DVec3::new(0.0, 5e5, 0.0), |i| vec![i as f64]).into_iter().take(150).collect();
+    let mut files: Vec<(String, Vec<u8>)> = plys(&[&XYZ[..], &[("red", "ushort")]].concat(), &few).into();
+    files.extend(pcds("WIDTH 50\nHEIGHT 3", &few, "x y z intensity"));
+    let text = lines(DVec3::ZERO, 3, |i| format!(" {i} 0 255")).into_iter().take(150);
+    files.push(("a.csv".into(), format!("x y z r g b\n{}\n", text.collect::<Vec<_>>().join("\n")).into_bytes()));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.e57");
+    let mut scanned = scanned();
+    scanned.retain(|i| i % 13 == 0);
+    write(&scanned, &path, &()).unwrap();
+    files.push(("a.e57".into(), std::fs::read(&path).unwrap()));
+    let mut random = Random::from_state(5);
+    let options = [ReadOptions { exact: true, ..ReadOptions::default() }];
+    for (name, bytes) in &files {
+        for round in 0..60 {
+            let mut bytes = bytes.clone();
+            for _ in 0..=random.modulo(3) {
+                // Headers matter more than values.
+                let end = if round % 2 == 0 { bytes.len().min(300) } else { bytes.len() };
+                let at = random.modulo(end);
+                bytes[at] = match random.modulo(3) {
+                    0 => random.bits() as u8,
+                    1 => b' ',
+                    _ => b'9',
+                };
+            }
+            if round % 5 == 0 {
+                bytes.truncate(random.modulo(bytes.len()));
+            }
+            check_bytes_with(name, &bytes, &options);
+        }
+    }
 }
 
 #[test]
