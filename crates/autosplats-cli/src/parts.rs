@@ -54,14 +54,14 @@ pub(crate) fn parts(
     need: &Need<'_>,
     console: &Console,
 ) -> Result<Option<Parts>, Failure> {
-    let memory = room.memory.or_else(|| available_memory().map(|free| free / 4 * 3));
+    let limit = room.memory.or_else(|| available_memory().map(|free| free / 4 * 3));
     // Of octrees, bounds and spacing read only what they need.
     let whole = part.spacing.is_some() || part.bounds.is_some() && inputs.only_tree();
-    let Some(points) = inputs.stated_points().filter(|_| !whole) else {
+    let Some(points) = inputs.points_at_most().filter(|_| !whole) else {
         if room.memory.is_some() && !whole {
             console.note(
-                "--memory: only one LAS, LAZ or COPC file or scene is worked on in parts, all else at once; make one octree \
-                 of the inputs first, such as all.copc.laz",
+                "--memory: only one file or scene is worked on in parts, several inputs at once; make one octree of them \
+                 first, such as all.copc.laz",
             );
         }
         return Ok(None);
@@ -72,18 +72,27 @@ pub(crate) fn parts(
         }
         return Ok(None);
     }
-    let least = points.saturating_mul(need.memory);
-    if memory.is_none_or(|memory| least <= memory) {
+    let limit = limit.unwrap_or(u64::MAX);
+    if points.saturating_mul(need.memory) <= limit {
         return Ok(None);
     }
     let memory = room.memory.unwrap_or_else(usual_memory);
     let folder = room.temp.clone().unwrap_or_else(|| folder_of(output).to_owned());
     let failed = |error| failure(error, output, &folder);
-    check_disk(&folder, points.saturating_mul(SPOOLED_BYTES + need.disk), need.what).map_err(failed)?;
     let bar = Bar::on_file("reading", Path::new(&inputs.names()), console);
     let _writing = console.interrupt().writing();
     let first = Part { whole: &bar, start: 0.0, len: 0.5 };
-    let Some(clouds) = inputs.in_parts(&first).map_err(failed)? else { return Ok(None) };
+    let Some(clouds) = inputs.in_parts(&first).map_err(failed)? else {
+        if room.memory.is_some() {
+            console.note("--memory: such a file cannot be read in parts, so all points are read at once");
+        }
+        return Ok(None);
+    };
+    let points = clouds.points().unwrap_or(points);
+    if points.saturating_mul(need.memory) <= limit {
+        return Ok(None);
+    }
+    check_disk(&folder, points.saturating_mul(SPOOLED_BYTES + need.disk), need.what).map_err(failed)?;
     let second = Part { whole: &bar, start: 0.5, len: 0.5 };
     let clouds = Spool::of(&*clouds, &folder, &second).map_err(failed)?;
     bar.report(1.0);

@@ -67,7 +67,7 @@ pub use memory::{available_memory, check_memory, usual_memory};
 pub use merge::normal_matrix;
 pub use pool::{PointPool, PointRun, SLOT_POINTS, SLOT_SHIFT};
 pub use precision::{
-    RelativeValues, ValueOrigin, degree_origin, residual, sampled_bounds, sampled_middle, storage_origin,
+    RelativeValues, ValueOrigin, degree_origin, residual, sample_step, sampled_bounds, sampled_middle, storage_origin,
 };
 pub use progress::{Part, Progress};
 pub use random::Random;

@@ -11,6 +11,12 @@ const MAX_WITHOUT_ORIGIN: f64 = 1e4;
 /// Number of points that the middle of a cloud is taken of.
 const MIDDLE_SAMPLES: usize = 1024;
 
+/// The step between sampled indices of `count` points or values; the first is 0. What is taken of a sample here is
+/// taken of these.
+pub fn sample_step(count: usize) -> usize {
+    count.div_ceil(MIDDLE_SAMPLES).max(1)
+}
+
 /// The origin for points at `world(0)` to `world(count - 1)`: their [middle](sampled_middle), or zero near zero.
 pub fn storage_origin(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
     let middle = sampled_middle(count, world);
@@ -28,16 +34,15 @@ pub fn degree_origin(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
 
 /// The box of a sample of the points; `None` if no sampled point is finite.
 pub fn sampled_bounds(count: usize, world: impl Fn(usize) -> DVec3) -> Option<[DVec3; 2]> {
-    let step = count.div_ceil(MIDDLE_SAMPLES).max(1);
-    let sample = (0..count).step_by(step).map(world).filter(|point| point.is_finite());
+    let sample = (0..count).step_by(sample_step(count)).map(world).filter(|point| point.is_finite());
     sample.map(|point| [point; 2]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
 }
 
 /// A place of whole numbers in the middle of the points: the median of a sample. Outliers do not move a median as they
 /// move the centre of the bounds.
 pub fn sampled_middle(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
-    let step = count.div_ceil(MIDDLE_SAMPLES).max(1);
-    let sample: Vec<DVec3> = (0..count).step_by(step).map(world).filter(|point| point.is_finite()).collect();
+    let sample: Vec<DVec3> =
+        (0..count).step_by(sample_step(count)).map(world).filter(|point| point.is_finite()).collect();
     let median = |axis: usize| {
         let mut values: Vec<f64> = sample.iter().map(|point| point[axis]).collect();
         let index = values.len() / 2;
@@ -80,9 +85,8 @@ pub struct ValueOrigin {
 impl<'a> RelativeValues<'a> {
     /// Finds the origin: the median of a sample, or zero for types that `f32` holds exactly.
     pub fn new(values: &'a FieldValues) -> Self {
-        let step = values.len().div_ceil(MIDDLE_SAMPLES).max(1);
         let median = || {
-            let sample = (0..values.len()).step_by(step).map(|index| values.get(index));
+            let sample = (0..values.len()).step_by(sample_step(values.len())).map(|index| values.get(index));
             let mut sample: Vec<f64> = sample.filter(|value| value.is_finite()).collect();
             sample.sort_by(f64::total_cmp);
             sample.get(sample.len() / 2).copied().unwrap_or_default()

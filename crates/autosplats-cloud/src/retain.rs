@@ -43,22 +43,31 @@ impl PointCloud {
     /// Removes the points at (0, 0, 0), which scanners write for missing returns, if `accepts` is true of their number.
     /// Returns the number of removed points.
     pub fn drop_no_returns(&mut self, accepts: impl Fn(usize) -> bool) -> usize {
-        // With the origin at zero, positions are world coordinates. A zero has no bit set but the sign.
-        let exact = self.origin == DVec3::ZERO && self.residuals.is_none();
-        let zero = |[x, y, z]: &[f32; 3]| (x.to_bits() | y.to_bits() | z.to_bits()) << 1 == 0;
-        let absent = |i: usize| if exact { zero(&self.positions[i]) } else { self.world_position(i) == DVec3::ZERO };
-        let count = if exact {
-            let zeros = |points: &[[f32; 3]]| points.iter().map(|point| usize::from(zero(point))).sum::<usize>();
-            self.positions.par_chunks(BLOCK).map(zeros).sum()
-        } else {
-            (0..self.len()).into_par_iter().filter(|&i| absent(i)).count()
-        };
+        let count = self.no_returns();
         if count == 0 || !accepts(count) {
             return 0;
         }
-        let keep: Vec<bool> = (0..self.len()).into_par_iter().map(|i| !absent(i)).collect();
+        let keep: Vec<bool> = (0..self.len()).into_par_iter().map(|i| !self.is_no_return(i)).collect();
         self.retain(|i| keep[i]);
         count
+    }
+
+    /// Number of points at (0, 0, 0), which scanners write for missing returns.
+    pub fn no_returns(&self) -> usize {
+        if !self.is_world() {
+            return (0..self.len()).into_par_iter().filter(|&i| self.is_no_return(i)).count();
+        }
+        let zeros = |points: &[[f32; 3]]| points.iter().map(|point| usize::from(is_zero(point))).sum::<usize>();
+        self.positions.par_chunks(BLOCK).map(zeros).sum()
+    }
+
+    fn is_no_return(&self, index: usize) -> bool {
+        if self.is_world() { is_zero(&self.positions[index]) } else { self.world_position(index) == DVec3::ZERO }
+    }
+
+    /// Whether positions are world coordinates.
+    fn is_world(&self) -> bool {
+        self.origin == DVec3::ZERO && self.residuals.is_none()
     }
 
     /// Updates the ranges of the scans in one pass over the points: there may be as many scans as points.
@@ -80,6 +89,11 @@ impl PointCloud {
             scan.points = moved(scan.points.start)..moved(scan.points.end);
         }
     }
+}
+
+/// Whether a position is zero: no bit is set but the signs.
+fn is_zero([x, y, z]: &[f32; 3]) -> bool {
+    (x.to_bits() | y.to_bits() | z.to_bits()) << 1 == 0
 }
 
 fn compact<T>(values: &mut Vec<T>, keep: &[bool]) {

@@ -74,6 +74,64 @@ impl Levels {
     }
 }
 
+/// What all colours of a file tell together. Those of its parts can be joined.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ColorLook {
+    levels: Levels,
+    /// Whether 8 bits lose some value in each scale.
+    lost: [bool; 3],
+}
+
+impl ColorLook {
+    /// What `count` colours tell. Whether 8 bits lose some is found out only if `exact`.
+    pub(crate) fn of(count: usize, exact: bool, color: impl Fn(usize) -> [f64; 3] + Sync + Send) -> Self {
+        let add = |mut look: Self, i: usize| {
+            let color = color(i);
+            look.levels = look.levels.with(color);
+            if exact {
+                for (scale, lost) in look.lost.iter_mut().enumerate() {
+                    *lost = *lost || !color.iter().all(|&value| keeps(scale, value));
+                }
+            }
+            look
+        };
+        (0..count).into_par_iter().fold(Self::default, add).reduce(Self::default, Self::and)
+    }
+
+    #[must_use]
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            levels: self.levels.and(other.levels),
+            lost: [0, 1, 2].map(|scale| self.lost[scale] || other.lost[scale]),
+        }
+    }
+
+    /// The scale. Only floats can be in 0 to 1.
+    pub(crate) fn scale(&self, float: bool) -> ColorScale {
+        ColorScale::of_levels(self.levels, float)
+    }
+
+    /// Whether 8 bits lose some value in this scale.
+    pub(crate) fn loses(&self, scale: ColorScale) -> bool {
+        self.lost[scale.index]
+    }
+}
+
+/// A value in a scale as 8 bits.
+fn byte(scale: usize, value: f64) -> u8 {
+    // 16-bit values are cut, not rounded: that restores the byte both of v * 256 and of v * 257.
+    (match scale {
+        0 => value * 255.0 + 0.5,
+        1 => value + 0.5,
+        _ => value / 256.0,
+    }) as u8
+}
+
+/// Whether 8 bits keep a value in a scale exactly.
+fn keeps(scale: usize, value: f64) -> bool {
+    (value - f64::from(byte(scale, value)) * (FULL[scale] / 255.0)).abs() < 1e-6
+}
+
 /// The scale of colours.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ColorScale {
@@ -114,17 +172,7 @@ impl ColorScale {
     }
 
     pub(crate) fn byte(self, value: f64) -> u8 {
-        // 16-bit values are cut, not rounded: that restores the byte both of v * 256 and of v * 257.
-        (match self.index {
-            0 => value * 255.0 + 0.5,
-            1 => value + 0.5,
-            _ => value / 256.0,
-        }) as u8
-    }
-
-    /// Whether 8 bits keep the value exactly.
-    pub(crate) fn keeps(self, value: f64) -> bool {
-        (value - f64::from(self.byte(value)) * (self.full() / 255.0)).abs() < 1e-6
+        byte(self.index, value)
     }
 
     /// Note on values that are clipped, if there are any.
@@ -190,6 +238,6 @@ mod tests {
         assert_eq!([0.0, 0.5, 1.0, 1.6, f64::NAN].map(|value| float.byte(value)), [0, 128, 255, 255, 0]);
         let wide = ColorScale::of(3, false, |_| [65535.0, 256.0, 512.0]);
         assert_eq!([512.0, 514.0, 65535.0, 1e9, -5.0].map(|value| wide.byte(value)), [2, 2, 255, 255, 0]);
-        assert!(wide.keeps(514.0) && !wide.keeps(513.0), "v * 257 is kept");
+        assert!(keeps(2, 514.0) && !keeps(2, 513.0), "v * 257 is kept");
     }
 }

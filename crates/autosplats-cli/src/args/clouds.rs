@@ -26,7 +26,8 @@ Examples:
   autosplats convert city.copc.laz thin.laz --voxel 0.1 --memory 1G
 
 A name that ends in .copc.laz makes an octree. About as much disk as the uncompressed points take is used for a while.
-LAS, LAZ, COPC and scenes may be larger than memory; other inputs are read whole, one at a time.";
+LAS, LAZ, COPC, PLY, PCD, E57, text and scenes may be larger than memory. Meshes, compressed PCD, what gzip compressed
+and other formats are read whole, one at a time.";
 
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_EXAMPLES, override_usage = "autosplats convert [OPTIONS] <INPUT>... <OUT>")]
@@ -56,7 +57,7 @@ pub(crate) struct ConvertArgs {
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Running")]
 pub(crate) struct RoomArgs {
-    /// Memory for points, such as 500M. A LAS, LAZ or COPC file or a scene with more points is worked on in parts
+    /// Memory for points, such as 500M. One file or scene with more points is worked on in parts
     /// [default: what is free; for octrees a quarter of it, at most 2G]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,

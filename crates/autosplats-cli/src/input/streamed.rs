@@ -1,12 +1,13 @@
 //! Inputs whose points are read in parts, for what needs no more memory than a part.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::Read as _;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use autosplats_cloud::glam::DMat4;
-use autosplats_cloud::{Clouds, Error, PointCloud, Progress};
-use autosplats_formats::{TreeInput, describe, open_parts};
+use autosplats_cloud::{Clouds, Error, Part, PointCloud, Progress};
+use autosplats_formats::{Parts, TreeInput, describe, open_parts};
 use autosplats_scenes::Scene;
 use autosplats_sources::{Input, Source};
 
@@ -21,11 +22,15 @@ impl Inputs {
         self.list.iter().map(streamed).collect()
     }
 
-    /// Number of points that the only input states, if it can be read in parts.
-    pub(crate) fn stated_points(&self) -> Option<u64> {
+    /// Number of points of the only input, or more of them, if it may be read in parts.
+    pub(crate) fn points_at_most(&self) -> Option<u64> {
         match self.list.as_slice() {
             [input] if is_plain(input) => match &input.source {
-                Source::File(path) if is_las(path) => describe(path, &input.options).ok()?.points,
+                Source::File(path) => match describe(path, &input.options) {
+                    Ok(description) if description.points.is_some() => description.points,
+                    // Text does not state it. No row is shorter than three digits, each with a byte behind it.
+                    _ => path.metadata().ok().filter(Metadata::is_file).map(|metadata| metadata.len() / 6),
+                },
                 Source::Scene(_, count) if !input.moves() => Some(*count as u64),
                 _ => None,
             },
@@ -57,6 +62,9 @@ fn streamed(input: &Input) -> TreeInput<'_> {
     let plain = is_plain(input);
     match &input.source {
         Source::File(path) if plain && is_las(path) => TreeInput::Las(path.clone()),
+        Source::File(path) if plain && !input.moves() => {
+            TreeInput::Clouds(Box::new(FileClouds { input, path, parts: OnceLock::new() }))
+        }
         Source::Scene(scene, count) if plain && !input.moves() => {
             TreeInput::Clouds(Box::new(SceneClouds { name: &input.name, scene, count: *count }))
         }
@@ -68,6 +76,44 @@ fn streamed(input: &Input) -> TreeInput<'_> {
 fn is_las(path: &Path) -> bool {
     let mut start = [0; 4];
     File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *b"LASF"
+}
+
+/// Share of reading a file for the first time that settling takes what all its points tell.
+const SETTLING: f32 = 0.5;
+
+/// A file that is read in parts if its format allows it.
+struct FileClouds<'a> {
+    input: &'a Input,
+    path: &'a Path,
+    /// Set once the file is opened: `None` if it is read whole.
+    parts: OnceLock<Option<Parts>>,
+}
+
+impl Clouds for FileClouds<'_> {
+    fn name(&self) -> &Path {
+        Path::new(&self.input.name)
+    }
+
+    fn read(
+        &self,
+        progress: &dyn Progress,
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let mut start = 0.0;
+        let parts = match self.parts.get() {
+            Some(parts) => parts,
+            None => {
+                let settling = Part { whole: progress, start, len: SETTLING };
+                let parts = open_parts(self.path, &self.input.options, &settling)?;
+                start = if parts.is_some() { SETTLING } else { 0.0 };
+                self.parts.get_or_init(|| parts)
+            }
+        };
+        match parts {
+            Some(parts) => Clouds::read(parts, &Part { whole: progress, start, len: 1.0 - start }, take),
+            None => Whole(self.input).read(progress, take),
+        }
+    }
 }
 
 /// An input that is read whole.

@@ -11,6 +11,9 @@ use crate::{FieldValues, PointCloud, each_type};
 /// Names of fields with classes, without separators and in lower case. The first that a cloud has is taken.
 const CLASS_FIELDS: [&str; 4] = ["classification", "class", "label", "labels"];
 
+/// The reason of points that no word without a hyphen matches.
+const OTHERS: &str = "others";
+
 /// Points checked at a time.
 const BLOCK: usize = 1 << 16;
 
@@ -168,7 +171,7 @@ impl PointFilter {
                 let mut others = vec![false; cloud.len()];
                 wanted.iter().flat_map(|term| &term.tests).for_each(|test| test.mark(cloud, &mut others));
                 others.par_iter_mut().for_each(|other| *other = !*other);
-                left.add("others", &others);
+                left.add(OTHERS, &others);
             }
         }
         left
@@ -293,6 +296,21 @@ impl LeftOut {
     #[must_use]
     pub fn has(&self, index: usize) -> bool {
         self.marks.get(index).copied().unwrap_or(false)
+    }
+
+    /// Joins what one filter leaves out of consecutive parts of a cloud. Keeps the numbers and the reasons, and forgets
+    /// which points were left out.
+    #[must_use]
+    pub fn counts(parts: &[Self], filter: &PointFilter) -> Self {
+        let mut all = Self { total: parts.iter().map(|part| part.total).sum(), ..Self::default() };
+        for label in filter.terms.iter().map(|term| &*term.label).chain([OTHERS]) {
+            let reasons = parts.iter().flat_map(|part| &part.reasons).filter(|(known, _)| known == label);
+            let count: usize = reasons.map(|(_, count)| count).sum();
+            if count > 0 && !all.reasons.iter().any(|(known, _)| known == label) {
+                all.reasons.push((label.into(), count));
+            }
+        }
+        all
     }
 
     /// Adds the marked points.

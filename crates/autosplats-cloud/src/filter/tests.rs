@@ -68,6 +68,25 @@ fn what_is_left_out_is_told() {
 }
 
 #[test]
+fn what_is_left_out_of_parts_is_told_like_that_of_the_whole() {
+    let whole = cloud();
+    for words in ["usual", "-withheld,-noise", "ground,-withheld", "2..7,first", "all", "-first,-last"] {
+        let filter: PointFilter = words.parse().expect("a filter");
+        let part = |range: std::ops::Range<usize>| {
+            let mut part = whole.clone();
+            part.retain(|i| range.contains(&i));
+            filter.left_out(&part)
+        };
+        let expected = filter.left_out(&whole);
+        for at in 0..=whole.len() {
+            // The reasons of a part may be those of the whole that come last.
+            let found = LeftOut::counts(&[part(0..at), part(at..whole.len())], &filter);
+            assert_eq!((found.count(), found.to_string()), (expected.count(), expected.to_string()), "{words} at {at}");
+        }
+    }
+}
+
+#[test]
 fn other_words_are_refused() {
     for (bad, why) in [
         ("grond", "'grond' is no class, flag or return"),

@@ -1,6 +1,6 @@
 //! Leaves out the points that the caller does not want, in every format alike.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, fmt};
 
 use autosplats_cloud::{Contents, Error, LeftOut, PointCloud, PointFilter, Progress, class_name};
 
@@ -16,12 +16,22 @@ const MAX_LISTED: usize = 10;
 /// The points that the options leave out, which is noted. Fails if the points lack a field that the filter needs, or if
 /// it keeps none of them.
 pub(super) fn left_out(job: &Job<'_>, format: &Format, cloud: &PointCloud) -> Result<LeftOut, Error> {
-    let Some(filter) = job.options.keep.as_ref().filter(|filter| !filter.is_all()) else {
-        return Ok(LeftOut::default());
+    let Some(filter) = filter(job, format, cloud)? else { return Ok(LeftOut::default()) };
+    let left = filter.left_out(cloud);
+    let classes = || {
+        let mut classes = Classes::default();
+        classes.add(cloud);
+        classes
     };
+    Ok(if decide(job, filter, &left, cloud.len(), classes)? { left } else { LeftOut::default() })
+}
+
+/// The filter, if it leaves out points of clouds with such fields. Fails if the points lack a field that it needs.
+pub(super) fn filter<'a>(job: &Job<'a>, format: &Format, cloud: &PointCloud) -> Result<Option<&'a PointFilter>, Error> {
+    let Some(filter) = job.options.keep.as_ref().filter(|filter| !filter.is_all()) else { return Ok(None) };
     let las = format.name == las::FORMAT.name;
     if filter.is_usual() && !las && cloud.field("Classification").is_some() && !has_standard_classes(job, format) {
-        return Ok(LeftOut::default());
+        return Ok(None);
     }
     // The reader of LAS leaves out fields that are 0 at every point.
     if !las && let Some(missing) = filter.missing_field(cloud) {
@@ -29,24 +39,34 @@ pub(super) fn left_out(job: &Job<'_>, format: &Format, cloud: &PointCloud) -> Re
         let there = if names.is_empty() { "they have none".into() } else { format!("there are {}", names.join(", ")) };
         return Err(job.unsupported(format!("--keep {filter}: its points have no field {missing}; {there}")));
     }
-    let left = filter.left_out(cloud);
+    Ok(Some(filter))
+}
+
+/// Decides whether `left` of all points are left out, and tells the user. Fails if the filter keeps none.
+pub(super) fn decide(
+    job: &Job<'_>,
+    filter: &PointFilter,
+    left: &LeftOut,
+    points: usize,
+    classes: impl FnOnce() -> Classes,
+) -> Result<bool, Error> {
     if left.count() == 0 {
-        return Ok(left);
+        return Ok(false);
     }
-    if left.count() < cloud.len() {
+    if left.count() < points {
         job.note(if filter.is_usual() {
             format!("left out {left}; --keep all keeps them")
         } else {
-            format!("--keep {filter} left out {} of {} points", left.count(), cloud.len())
+            format!("--keep {filter} left out {} of {points} points", left.count())
         });
-        return Ok(left);
+        return Ok(true);
     }
     if filter.is_usual() {
-        job.note(format!("all {} points are noise or withheld, so they are kept", cloud.len()));
-        return Ok(LeftOut::default());
+        job.note(format!("all {points} points are noise or withheld, so they are kept"));
+        return Ok(false);
     }
-    let (path, filter, points) = (job.path.into(), filter.to_string(), cloud.len());
-    Err(Error::NothingKept { path, filter, points, there: classes(cloud) })
+    let (path, filter, there) = (job.path.into(), filter.to_string(), classes().to_string());
+    Err(Error::NothingKept { path, filter, points, there })
 }
 
 /// Whether classes of a format that has none of its own are those of LAS. A label 7 of other data may be anything, so
@@ -59,15 +79,30 @@ fn has_standard_classes(job: &Job<'_>, format: &Format) -> bool {
     described.is_ok_and(|facts| facts.attributes.iter().any(|attribute| standard(&attribute.name)))
 }
 
-/// The classes of the points, as the end of a sentence.
-fn classes(cloud: &PointCloud) -> String {
-    let Some(values) = cloud.class_values() else { return String::new() };
-    let whole = (0..cloud.len()).map(|i| values.get(i)).filter(|value| value.fract() == 0.0);
-    let found: BTreeSet<i64> = whole.map(|value| value as i64).collect();
-    let name = |class: &i64| class_name(*class as f64).map_or(class.to_string(), |name| format!("{class} {name}"));
-    let names: Vec<_> = found.iter().take(MAX_LISTED).map(name).collect();
-    let more = if found.len() > MAX_LISTED { " …" } else { "" };
-    if names.is_empty() { String::new() } else { format!("; its classes: {}{more}", names.join(", ")) }
+/// The lowest classes of points. The text is the end of a sentence.
+#[derive(Default)]
+pub(super) struct Classes(BTreeSet<i64>);
+
+impl Classes {
+    /// Adds those of a cloud.
+    pub(super) fn add(&mut self, cloud: &PointCloud) {
+        let Some(values) = cloud.class_values() else { return };
+        for value in (0..cloud.len()).map(|i| values.get(i)).filter(|value| value.fract() == 0.0) {
+            self.0.insert(value as i64);
+            if self.0.len() > MAX_LISTED + 1 {
+                self.0.pop_last();
+            }
+        }
+    }
+}
+
+impl fmt::Display for Classes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = |class: &i64| class_name(*class as f64).map_or(class.to_string(), |name| format!("{class} {name}"));
+        let names: Vec<_> = self.0.iter().take(MAX_LISTED).map(name).collect();
+        let more = if self.0.len() > MAX_LISTED { " …" } else { "" };
+        if names.is_empty() { Ok(()) } else { write!(f, "; its classes: {}{more}", names.join(", ")) }
+    }
 }
 
 /// Removes points, and the triangles that have one of them as a corner.

@@ -13,6 +13,7 @@
 mod body;
 mod choose;
 mod columns;
+mod cuts;
 mod depth_image;
 mod describe;
 mod e57;
@@ -26,13 +27,16 @@ mod mesh;
 mod names;
 mod obj;
 mod off;
+mod opened;
 mod options;
 mod parts;
 mod pcd;
+mod pieces;
 mod placed;
 mod ply;
 mod ptx;
 mod raw;
+mod records;
 mod registry;
 mod sensor;
 mod stl;
@@ -47,7 +51,7 @@ pub use self::{
     depth_image::color::beside as colors_beside,
     describe::{Attribute, Description},
     options::ReadOptions,
-    parts::{Parts, open_parts},
+    parts::{Parts, open_parts, open_parts_of},
     registry::{
         check_not_lfs_pointer, describe, describe_bytes, formats, gltf_animation, is_named_as_points, read, read_bytes,
         read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with,

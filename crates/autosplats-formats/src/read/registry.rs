@@ -290,7 +290,8 @@ pub fn check_not_lfs_pointer(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     Ok(())
 }
 
-fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
+/// The format of a file.
+pub(super) fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
     check_not_lfs_pointer(job.path, job.bytes)?;
     let by_content = FORMATS.iter().find(|format| (format.recognised)(job.bytes)).copied();
     // Rows of numbers can stand in files of any name, so they are looked for last.
@@ -312,9 +313,7 @@ fn kept(job: &Job<'_>) -> Result<Contents, Error> {
 fn contents(job: &Job<'_>) -> Result<(Contents, LeftOut), Error> {
     job.tick(0.0)?;
     let format = format(job)?;
-    if job.options.columns.is_some() && !takes_columns(job, format) {
-        job.note(format!("--columns is for text and headerless records; {} names its own columns", format.name));
-    }
+    tell_columns(job, format);
     let previews = choose::ChosenPreviews::new(job, format);
     let progress = previews.as_ref().map_or(job.progress, |previews| previews as &dyn Progress);
     let mut contents = (format.read)(&Job { progress, ..*job })?;
@@ -336,13 +335,26 @@ fn takes_columns(job: &Job<'_>, format: &Format) -> bool {
         || format.name == pcd::FORMAT.name && pcd::without_header(job)
 }
 
-/// Drops points at (0, 0, 0), which scanners write for missing returns. A single such point may be real, unless
-/// coordinates are in the sensor's frame.
+/// Tells that names of columns are given to a format that has its own.
+pub(super) fn tell_columns(job: &Job<'_>, format: &Format) {
+    if job.options.columns.is_some() && !takes_columns(job, format) {
+        job.note(format!("--columns is for text and headerless records; {} names its own columns", format.name));
+    }
+}
+
+/// Drops points at (0, 0, 0), which scanners write for missing returns.
 fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
     let total = cloud.len();
+    cloud.drop_no_returns(|count| are_no_returns(job, format, count, total));
+}
+
+/// Decides whether `count` of `total` points at (0, 0, 0) are missing returns, and tells the user. A single such point
+/// may be real, unless coordinates are in the sensor's frame.
+pub(super) fn are_no_returns(job: &Job<'_>, format: &Format, count: usize, total: usize) -> bool {
     let least = if format.sensor_frame { 1 } else { 2 };
-    let count = cloud.drop_no_returns(|count| (least..total).contains(&count));
-    if count > 0 {
+    let none = (least..total).contains(&count);
+    if none {
         job.note(format!("dropped {count} of {total} points at (0, 0, 0), where nothing was measured"));
     }
+    none
 }

@@ -1,27 +1,19 @@
 //! Columns of numbers to a cloud, shared by binary and text formats.
 
+mod settle;
+
 use std::{ops::Range, path::Path};
 
-use autosplats_cloud::{Crs, Error, FieldValues, PointCloud, Unit, degree_origin, residual, storage_origin};
+use autosplats_cloud::{Error, FieldValues, PointCloud};
 use glam::DVec3;
 use rayon::prelude::*;
 
+pub(super) use self::settle::{Look, Plan, Settled};
 pub use super::columns::{MAX_COLUMNS, numbered};
-use super::{
-    Attribute, Job, ReadOptions,
-    columns::{AGAIN, field_name, find_axes, find_color, is_longitude},
-    units::{LOOKS_LIKE_DEGREES, look_like_degrees},
-};
-use crate::color_scale::ColorScale;
+use super::{Attribute, Job, ReadOptions};
 
 /// Points processed between two checks for cancellation: a few milliseconds of work.
 const BLOCK: usize = 1 << 18;
-
-/// Columns of 3D Gaussian splats that hold the coefficients of the colour seen from everywhere.
-const SPLAT_COLORS: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
-
-/// The spherical harmonic of degree 0: 1 / (2 √π).
-const SPLAT_COLOR_STEP: f64 = 0.282_094_791_773_878_14;
 
 /// Number types in files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,100 +149,13 @@ impl Table<'_> {
         self.made(job, place, true)
     }
 
-    /// Makes the cloud; `guess` tells whether coordinates without a unit may be taken for degrees by their shape.
-    fn made(mut self, job: &Job<'_>, place: &str, guess: bool) -> Result<PointCloud, Error> {
-        if self.columns.len() > MAX_COLUMNS {
-            return Err(job.malformed(place, format!("{} values a point; at most {MAX_COLUMNS}", self.columns.len())));
-        }
-        let names: Vec<String> = self.columns.iter().map(|column| column.name.clone()).collect();
-        let Some(axes) = find_axes(&names) else {
-            return Err(job.malformed(place, "there are no x, y and z among the values of a point"));
-        };
-        self.check_size(job, place)?;
-        let xyz = self.take(axes);
-        let world = |i| DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, i)));
-        let fine = xyz[..2].iter().all(|column| column.scalar == Scalar::F64);
-        let named = is_longitude(&names[axes[0]]);
-        let guessed = guess && !named && fine && job.options.columns.is_none() && look_like_degrees(self.count, world);
-        let degrees = named || guessed;
-        let origin = if degrees { degree_origin(self.count, world) } else { storage_origin(self.count, world) };
-        let exact = if job.options.exact { 12 } else { 0 };
-        let fields: usize = self.columns.iter().map(|column| column.scalar.size()).sum();
-        job.check_memory(self.count, 12 + exact + fields)?;
-        let names: Vec<String> = self.columns.iter().map(|column| column.name.clone()).collect();
-        let colors = find_color(&names).map(|three| self.take(three));
-        let is_packed = |column: &Column| self.packed_rgb && is_packed_color(&column.name, column.scalar);
-        let packed = self.columns.iter().position(is_packed).map(|index| self.columns.remove(index));
-        let splats = match (&colors, &packed) {
-            (None, None) => self.find(SPLAT_COLORS).map(|indices| indices.map(|index| self.columns[index].clone())),
-            _ => None,
-        };
-
-        let colored = colors.is_some() || packed.is_some() || splats.is_some();
-        let steps = 1 + usize::from(colored) + self.columns.len();
-        let part = |step: usize| ProgressRange {
-            start: self.done + (1.0 - self.done) * step as f32 / steps as f32,
-            len: (1.0 - self.done) / steps as f32,
-        };
-        let mut cloud = PointCloud::new(origin, self.positions(job, &xyz, origin, part(0))?);
-        if degrees {
-            cloud = cloud.with_crs(Crs { unit: Some(Unit::Degree), ..Crs::default() });
-        }
-        if guessed {
-            job.note(LOOKS_LIKE_DEGREES);
-        }
-        if let Some(residuals) = self.residuals(job, &xyz, &cloud)? {
-            cloud = cloud.with_residuals(residuals)?;
-        }
-        let mut step = 1;
-        if let Some(rgb) = &colors {
-            let (bytes, exact) = self.colors(job, rgb, part(step))?;
-            cloud = cloud.with_colors(bytes)?;
-            if job.options.exact && !exact {
-                for (column, name) in rgb.iter().zip(["Red", "Green", "Blue"]) {
-                    cloud = cloud.with_field(name, self.field(job, column, part(step))?)?;
-                }
-            }
-            step += 1;
-        } else if let Some(column) = &packed {
-            let alpha = |i| self.value::<u32>(column, i).to_be_bytes()[0];
-            let varies = column.name.eq_ignore_ascii_case("rgba")
-                && (1..self.count).into_par_iter().any(|i| alpha(i) != alpha(0));
-            if varies {
-                let values = collect("alpha", self.count, job, part(step), alpha)?;
-                cloud = cloud.with_field("Alpha", FieldValues::U8(values))?;
-            }
-            let unpack = |i| {
-                let [_, red, green, blue] = self.value::<u32>(column, i).to_be_bytes();
-                [red, green, blue]
-            };
-            cloud = cloud.with_colors(collect("colours", self.count, job, part(step), unpack)?)?;
-            step += 1;
-        } else if let Some(rgb) = &splats {
-            job.note("these are 3D Gaussian splats; shown as points in their base colours");
-            let byte = |column: &Column, i| ((0.5 + SPLAT_COLOR_STEP * self.value_f64(column, i)) * 255.0 + 0.5) as u8;
-            let color = |i| rgb.each_ref().map(|column| byte(column, i));
-            cloud = cloud.with_colors(collect("colours", self.count, job, part(step), color)?)?;
-            step += 1;
-        }
-        let known = xyz.iter().chain(colors.iter().flatten());
-        let known: Vec<String> = known.map(|column| column.name.to_lowercase()).collect();
-        for column in &self.columns {
-            let values = self.field(job, column, part(step))?;
-            step += 1;
-            // Two columns may map to one name, as `intensity` and `scalar_Intensity` do.
-            let mut name = field_name(&column.name);
-            let again = known.contains(&name.to_lowercase());
-            if again {
-                job.note(format!("there is more than one {name}; the first is read, another is kept as {name}{AGAIN}"));
-                name.push_str(AGAIN);
-            }
-            while cloud.fields().iter().any(|field| field.name == name) {
-                name.push_str(if again { AGAIN } else { "_" });
-            }
-            cloud = cloud.with_field(name, values)?;
-        }
-        Ok(cloud)
+    /// Makes the cloud; for `guess` see [`Plan::of`].
+    fn made(self, job: &Job<'_>, place: &str, guess: bool) -> Result<PointCloud, Error> {
+        let plan = Plan::of(&self, job, place, guess)?;
+        job.check_memory(self.count, plan.point_bytes())?;
+        let mut look = Look::default();
+        plan.look(&self, job, &mut look)?;
+        plan.settle(&look, job).build(&self, job)
     }
 
     /// Passes the points to the caller chunk by chunk, if the caller wants chunks.
@@ -272,23 +177,6 @@ impl Table<'_> {
         Ok(())
     }
 
-    /// Indices of the columns of three names, if all are there. Letter case is ignored.
-    fn find(&self, names: [&str; 3]) -> Option<[usize; 3]> {
-        let find = |name: &str| self.columns.iter().position(|column| column.name.eq_ignore_ascii_case(name));
-        Some([find(names[0])?, find(names[1])?, find(names[2])?])
-    }
-
-    /// Removes and returns three columns.
-    fn take(&mut self, indices: [usize; 3]) -> [Column; 3] {
-        let taken = indices.map(|index| self.columns[index].clone());
-        let mut index = 0;
-        self.columns.retain(|_| {
-            index += 1;
-            !indices.contains(&(index - 1))
-        });
-        taken
-    }
-
     /// Checks that every value lies within the bytes. Readers check first, with better messages.
     fn check_size(&self, job: &Job<'_>, place: &str) -> Result<(), Error> {
         let fits = |column: &Column| {
@@ -304,6 +192,11 @@ impl Table<'_> {
 
     fn value<T: Number>(&self, column: &Column, index: usize) -> T {
         T::read(self.bytes, column.offset + index * column.stride, self.big_endian)
+    }
+
+    /// World coordinates of a point.
+    fn world(&self, xyz: &[Column; 3], index: usize) -> DVec3 {
+        DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, index)))
     }
 
     fn value_f64(&self, column: &Column, index: usize) -> f64 {
@@ -328,7 +221,6 @@ impl Table<'_> {
         origin: DVec3,
         part: ProgressRange,
     ) -> Result<Vec<[f32; 3]>, Error> {
-        let world = |i| DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, i)));
         let [x, y, z] = xyz;
         let floats = xyz.iter().all(|column| column.scalar == Scalar::F32 && column.stride == x.stride);
         // All three lie within one record, not each in a run of its own.
@@ -352,7 +244,7 @@ impl Table<'_> {
             let xyz = xyz.each_ref();
             collect("positions", self.count, job, part, |i| xyz.map(|column| self.value::<f32>(column, i)))
         } else {
-            collect("positions", self.count, job, part, |i| (world(i) - origin).as_vec3().to_array())
+            collect("positions", self.count, job, part, |i| (self.world(xyz, i) - origin).as_vec3().to_array())
         }
     }
 
@@ -374,43 +266,6 @@ impl Table<'_> {
             values.par_extend(records.take(block.len()).map(&value));
         }
         Ok(values)
-    }
-
-    /// What `f32` loses of the positions, if all digits are wanted and some are lost.
-    fn residuals(&self, job: &Job<'_>, xyz: &[Column; 3], cloud: &PointCloud) -> Result<Option<Vec<[f32; 3]>>, Error> {
-        let lossless = |column: &Column| column.scalar == Scalar::F32 || column.scalar.size() < 4;
-        if !job.options.exact || cloud.origin() == DVec3::ZERO && xyz.iter().all(lossless) {
-            return Ok(None);
-        }
-        let origin = cloud.origin();
-        let lost = |i| residual(DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, i))) - origin);
-        if (0..self.count).into_par_iter().all(|i| lost(i) == [0.0; 3]) {
-            return Ok(None);
-        }
-        collect("residuals", self.count, job, ProgressRange { start: 1.0, len: 0.0 }, lost).map(Some)
-    }
-
-    /// Colours of any number type as 8 bits, and whether 8 bits keep them exactly.
-    fn colors(&self, job: &Job<'_>, rgb: &[Column; 3], part: ProgressRange) -> Result<(Vec<[u8; 3]>, bool), Error> {
-        let rgb = rgb.each_ref();
-        if rgb.iter().all(|column| column.scalar == Scalar::U8) {
-            let colors = collect("colours", self.count, job, part, |i| rgb.map(|column| self.value::<u8>(column, i)))?;
-            return Ok((colors, true));
-        }
-        job.tick(part.start)?;
-        let float = rgb.iter().any(|column| matches!(column.scalar, Scalar::F32 | Scalar::F64));
-        let scale = ColorScale::of(self.count, float, |i| rgb.map(|column| self.value_f64(column, i)));
-        let wide = !float && rgb.iter().any(|column| column.scalar.size() > 1) && self.count > 0;
-        if let Some(note) = scale.note() {
-            job.note(note);
-        } else if wide && scale.full() == 255.0 {
-            job.note("colours of 16 bits or more have no value above 255; read as 8 bits");
-        }
-        let colors =
-            collect("colours", self.count, job, part, |i| rgb.map(|column| scale.byte(self.value_f64(column, i))))?;
-        let same = |i| rgb.iter().all(|column| scale.keeps(self.value_f64(column, i)));
-        let exact = !job.options.exact || (0..self.count).into_par_iter().all(same);
-        Ok((colors, exact))
     }
 
     fn field(&self, job: &Job<'_>, column: &Column, part: ProgressRange) -> Result<FieldValues, Error> {

@@ -8,14 +8,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use autosplats_cloud::{Error, excerpt};
 use rayon::prelude::*;
 
+pub(super) use super::cuts::{after_line_end, line_end};
 use super::{
     Job,
     columns::{is_latitude, is_longitude},
+    cuts::Text,
     table::{CHUNK, ProgressRange, Scalar, is_packed_color, reserve},
 };
-
-/// Bytes of text that one thread parses at a time.
-const PIECE: usize = 1 << 19;
 
 /// Storage type of coordinates in text. All digits are read, even if the declared type holds fewer.
 pub(super) const TEXT: &str = "text";
@@ -133,62 +132,83 @@ impl Rows<'_> {
         show: impl Fn(&[u8], usize) -> Result<(), Error>,
     ) -> Result<(Vec<u8>, usize), Error> {
         let len = self.record_len();
-        let text = job.bytes;
-        let wanted = self.count.unwrap_or(usize::MAX);
         let mut records = Vec::new();
         let (mut rows, mut shown) = (0, 0);
+        let count = self.each(job, Text::Held(job.bytes), start, part, short, |bytes, more| {
+            reserve(&mut records, bytes.len(), "the points of a text file")?;
+            records.extend_from_slice(bytes);
+            rows += more;
+            if rows - shown >= CHUNK {
+                show(&records[shown * len..], rows - shown)?;
+                shown = rows;
+            }
+            Ok(())
+        })?;
+        records.truncate(count * len);
+        shown = shown.min(count);
+        show(&records[shown * len..], count - shown)?;
+        Ok((records, count))
+    }
+
+    /// Parses rows from byte `start` of a text on, and passes on the records of each piece, with their number, in
+    /// order. Returns the number of rows. The last row that is passed on does not count if the text ends within it.
+    pub(super) fn each(
+        &self,
+        job: &Job<'_>,
+        text: Text<'_>,
+        start: usize,
+        part: ProgressRange,
+        short: Option<&Short>,
+        mut take: impl FnMut(&[u8], usize) -> Result<(), Error>,
+    ) -> Result<usize, Error> {
+        let len = self.record_len();
+        let wanted = self.count.unwrap_or(usize::MAX);
+        let mut rows = 0;
         let mut complete_last = true;
         let mut at = start;
+        let mut space = Vec::new();
         while at < text.len() && rows < wanted {
             job.tick(part.start + part.len * (at - start) as f32 / (text.len() - start) as f32)?;
-            let mut cuts = vec![at];
-            while at < text.len() && cuts.len() <= 4 * rayon::current_num_threads() {
-                at = after_line_end(text, at.saturating_add(PIECE).min(text.len()));
-                cuts.push(at);
-            }
-            let pieces: Vec<Piece> =
-                cuts.par_windows(2).map(|cut| self.parse_piece(&text[cut[0]..cut[1]], cut[0], short)).collect();
+            let batch = text.batch(job, at, 4 * rayon::current_num_threads(), &mut space)?;
+            let parse = |cut: &[usize]| {
+                let (piece, start) = batch.piece(cut);
+                self.parse_piece(piece, start, short)
+            };
+            let pieces: Vec<Piece> = batch.cuts.par_windows(2).map(parse).collect();
+            at = batch.end();
             for piece in pieces {
-                let take = piece.rows.min(wanted - rows);
-                let bytes = take * len;
-                reserve(&mut records, bytes, "the points of a text file")?;
-                records.extend_from_slice(&piece.records[..bytes]);
-                rows += take;
+                let more = piece.rows.min(wanted - rows);
+                take(&piece.records[..more * len], more)?;
+                rows += more;
                 if rows == wanted {
                     break;
                 }
                 if let Some((offset, what)) = piece.error {
                     // An unfinished last line.
-                    if self.may_be_cut && rows > 0 && line_end(text, offset) == text.len() {
+                    if self.may_be_cut && rows > 0 && text.is_in_last_line(offset)? {
                         complete_last = false;
                         break;
                     }
-                    return Err(job.malformed(job.line(offset), what));
+                    return Err(job.malformed(text.line(offset)?, what));
                 }
-            }
-            if rows - shown >= CHUNK {
-                show(&records[shown * len..], rows - shown)?;
-                shown = rows;
             }
         }
         if self.count.is_some() && rows < wanted {
             if self.may_be_cut {
-                if !text.ends_with(b"\n") && complete_last {
+                let ends = text.bytes(text.len().saturating_sub(1), 1)? == b"\n";
+                if !ends && complete_last {
                     // Digits of the last value may be missing.
                     rows = rows.saturating_sub(1);
-                    records.truncate(rows * len);
-                    shown = shown.min(rows);
                 }
                 job.tell_cut_off(rows, wanted, "points")?;
             } else {
                 return Err(job.malformed(
-                    job.line(text.len()),
+                    text.line(text.len())?,
                     format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
                 ));
             }
         }
-        show(&records[shown * len..], rows - shown)?;
-        Ok((records, rows))
+        Ok(rows)
     }
 
     fn record_len(&self) -> usize {
@@ -323,14 +343,4 @@ pub(super) fn is_blank(line: &[u8]) -> bool {
 /// Whether a trimmed line is a single integer, such as the count before the points of a PTS file.
 pub(super) fn is_count(line: &[u8]) -> bool {
     !line.is_empty() && line.iter().all(u8::is_ascii_digit)
-}
-
-/// The end of the line that contains byte `at`, without its line feed.
-pub(super) fn line_end(text: &[u8], at: usize) -> usize {
-    text[at..].iter().position(|&byte| byte == b'\n').map_or(text.len(), |len| at + len)
-}
-
-/// The start of the line after the one that contains byte `at`.
-pub(super) fn after_line_end(text: &[u8], at: usize) -> usize {
-    (line_end(text, at) + 1).min(text.len())
 }

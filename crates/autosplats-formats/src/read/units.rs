@@ -66,7 +66,7 @@ pub(crate) fn settle_description(description: &mut Description) {
 }
 
 /// Note on heights that are scaled.
-fn scaled(crs: &Crs) -> Option<String> {
+pub(super) fn scaled(crs: &Crs) -> Option<String> {
     crs.height_scale()?;
     let (across, upward) = (crs.unit?.name(), crs.vertical_unit?.name());
     Some(format!("x and y are in {across}, heights in {upward}; heights are scaled to {across}"))

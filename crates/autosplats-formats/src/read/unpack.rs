@@ -6,7 +6,7 @@ use autosplats_cloud::{Error, Progress, Unmarked, check_memory};
 use flate2::bufread::GzDecoder;
 
 /// First bytes of a file that gzip compressed.
-const GZIP: &[u8] = &[0x1f, 0x8b, 8];
+pub(super) const GZIP: &[u8] = &[0x1f, 0x8b, 8];
 
 /// Fewest and most bytes decompressed between two checks of the memory and of cancellation.
 const STEPS: [usize; 2] = [1 << 16, 1 << 24];

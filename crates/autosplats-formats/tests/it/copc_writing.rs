@@ -7,10 +7,10 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Error, FieldValues, Key, PointCloud, PointFilter, Progress, Random,
+    Clouds, Error, FieldValues, Key, PointCloud, PointFilter, Progress, Random,
     glam::{DMat4, DVec3},
 };
-use autosplats_formats::{Clouds, ReadOptions, TreeInput, TreeOptions, open_tree, read_with, write, write_tree};
+use autosplats_formats::{ReadOptions, TreeInput, TreeOptions, open_tree, read_with, write, write_tree};
 
 use crate::common::{
     las_bytes,
@@ -43,7 +43,7 @@ impl Clouds for Held {
     fn read(
         &self,
         _progress: &dyn Progress,
-        take: &(dyn Fn(&PointCloud) -> Result<(), Error> + Sync),
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
     ) -> Result<(), Error> {
         take(&self.0)
     }

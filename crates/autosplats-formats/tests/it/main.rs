@@ -21,6 +21,7 @@ mod las_writing;
 mod losses;
 mod meshes;
 mod oddities;
+mod parts;
 mod progress;
 mod ptx;
 mod real_files;

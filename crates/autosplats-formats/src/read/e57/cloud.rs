@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
-use autosplats_cloud::{Axes, Error, PointCloud, Scan, excerpt};
+use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, Scan, excerpt, residual, sample_step, storage_origin};
 use glam::{DMat3, DMat4, DVec3};
+use rayon::prelude::*;
 
 use super::super::{
     Job,
@@ -12,11 +13,12 @@ use super::super::{
     table::ProgressRange,
 };
 use super::{
-    colors::{Colors, color_fields},
+    colors::{GREY, Tint},
     element::{Kind, Stored},
     source::Source,
     xml::ScanHeader,
 };
+use crate::color_scale::Levels;
 
 /// Points of a preview chunk.
 const CHUNK: usize = 1 << 20;
@@ -25,69 +27,202 @@ const CHUNK: usize = 1 << 20;
 pub(super) fn preview(job: &Job<'_>, source: &Source<'_>) -> Result<(), Error> {
     let quiet = Job { progress: &(), ..*job };
     let part = ProgressRange { start: 0.0, len: 0.0 };
-    let colors = Colors::new(&quiet, source);
+    let mut tint = Tint::of(source.header);
+    if let Some(tint) = &mut tint {
+        tint.settle(tint.levels(source), &quiet);
+    }
     for start in (0..source.len()).step_by(CHUNK) {
         let lens = [CHUNK.min(source.len() - start)];
         job.preview(|| {
             let cloud = place(&quiet, &lens, part, |_| move |i| source.world(start + i))?;
-            let Some(colors) = &colors else { return Ok(cloud) };
-            cloud.with_colors(fill(&quiet, "colours", &lens, part, |_| move |i| colors.bytes(start + i))?)
+            let Some(tint) = &tint else { return Ok(cloud) };
+            cloud.with_colors(fill(&quiet, "colours", &lens, part, |_| move |i| tint.bytes(source, start + i))?)
         })?;
     }
     Ok(())
 }
 
-/// Makes the cloud of all scans. `done` is the finished fraction of the work; for `trusted` see [`is_of_scanner`].
-pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: f32) -> Result<PointCloud, Error> {
-    let lens: Vec<usize> = sources.iter().map(Source::len).collect();
-    let total: usize = lens.iter().sum();
-    let fields = fields(job, sources);
-    let bytes: usize = fields.iter().map(|field| field.kind.size()).sum();
-    job.check_memory(total, 12 + 3 + bytes + if job.options.exact { 12 + 6 } else { 0 })?;
-    let steps = 2.0 + fields.len() as f32;
-    let part = |step: f32| ProgressRange { start: done + (1.0 - done) * step / steps, len: (1.0 - done) / steps };
+/// A scan, and how many of its points are kept.
+#[derive(Clone, Copy)]
+pub(super) struct Kept<'a> {
+    pub(super) header: &'a ScanHeader,
+    pub(super) points: usize,
+}
 
-    let mut cloud = place(job, &lens, part(0.0), |index| move |i| sources[index].world(i))?;
-    cloud = color_fields(job, sources, &lens, cloud, part(1.0))?;
-    for (step, field) in fields.iter().enumerate() {
-        let mut values = field.kind.values();
-        macro_rules! filled {
-            ($v:ident, $read:ident, $absent:expr) => {
-                *$v = fill(job, &field.name, &lens, part(2.0 + step as f32), |index| {
-                    let taken = field.of(index).map(|taken| (taken, &sources[index]));
-                    move |i| taken.map_or($absent, |(taken, source)| taken.$read(source, source.value_of(i)) as _)
-                })?
-            };
+/// Points of one scan: all that are kept, or consecutive ones.
+pub(super) struct Run<'a> {
+    /// Index of the scan.
+    pub(super) scan: usize,
+    pub(super) source: &'a Source<'a>,
+    /// Number of the scan's kept points before these.
+    pub(super) first: usize,
+}
+
+/// Passes all points to a function, run by run in order.
+pub(super) type Each<'a> = dyn FnMut(&mut dyn FnMut(&Run<'_>) -> Result<(), Error>) -> Result<(), Error> + 'a;
+
+/// Gets points, and the origin that they are stored about.
+type See<'a> = dyn FnMut(&Run<'_>, DVec3) -> Result<(), Error> + 'a;
+
+/// All that the points are made by, which is decided by all of them.
+pub(super) struct Settled {
+    fields: Vec<MergedField>,
+    origin: DVec3,
+    residuals: bool,
+    /// Of each scan; none at all if no scan has colours.
+    tints: Vec<Option<Tint>>,
+    /// Whether colours are kept as 16-bit fields too, because 8 bits lose some.
+    wide_colors: bool,
+    /// Whether each scan's points come from a scanner.
+    pub(super) scanners: Vec<bool>,
+}
+
+impl Settled {
+    /// Settles it from two looks at all points, which `each` gives; for `trusted` see [`is_of_scanner`]. `see` gets the
+    /// points at the second look, and their origin.
+    pub(super) fn of(
+        job: &Job<'_>,
+        scans: &[Kept<'_>],
+        trusted: bool,
+        each: &mut Each<'_>,
+        mut see: Option<&mut See<'_>>,
+    ) -> Result<Self, Error> {
+        let fields = fields(job, scans);
+        let total: usize = scans.iter().map(|scan| scan.points).sum();
+        let before: Vec<usize> = scans
+            .iter()
+            .scan(0, |sum, scan| {
+                *sum += scan.points;
+                Some(*sum - scan.points)
+            })
+            .collect();
+        let mut tints: Vec<Option<Tint>> = scans.iter().map(|scan| Tint::of(scan.header)).collect();
+        let mut levels = vec![Levels::default(); scans.len()];
+        let (mut sample, step) = (Vec::new(), sample_step(total));
+        each(&mut |run| {
+            let start = before[run.scan] + run.first;
+            let sampled = (start.next_multiple_of(step)..start + run.source.len()).step_by(step);
+            sample.extend(sampled.map(|i| run.source.world(i - start)));
+            if let Some(tint) = &tints[run.scan] {
+                levels[run.scan] = levels[run.scan].and(tint.levels(run.source));
+            }
+            Ok(())
+        })?;
+        let origin = storage_origin(sample.len(), |i| sample[i]);
+        if tints.iter().all(Option::is_none) {
+            tints.clear();
         }
-        use autosplats_cloud::FieldValues::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
-        match &mut values {
-            U8(v) => filled!(v, integer, 0),
-            I8(v) => filled!(v, integer, 0),
-            U16(v) => filled!(v, integer, 0),
-            I16(v) => filled!(v, integer, 0),
-            U32(v) => filled!(v, integer, 0),
-            I32(v) => filled!(v, integer, 0),
-            U64(v) => filled!(v, integer, 0),
-            I64(v) => filled!(v, integer, 0),
-            F32(v) => filled!(v, value, f32::NAN),
-            F64(v) => filled!(v, value, f64::NAN),
+        for (tint, levels) in tints.iter_mut().zip(levels) {
+            tint.iter_mut().for_each(|tint| tint.settle(levels, job));
         }
-        cloud = cloud.with_field(&field.name, values)?;
+        let grey: usize =
+            scans.iter().zip(&tints).filter(|(_, tint)| tint.is_none()).map(|(scan, _)| scan.points).sum();
+        if grey > 0 {
+            job.note(format!("{grey} points belong to scans without colours; they become grey"));
+        }
+        let (mut residuals, mut wide_colors) = (false, false);
+        let exact = job.options.exact;
+        if exact || see.is_some() {
+            each(&mut |run| {
+                let (source, points) = (run.source, (0..run.source.len()).into_par_iter());
+                let loses = |i| residual(source.world(i) - origin) != [0.0; 3];
+                residuals = residuals || exact && points.clone().any(loses);
+                if let Some(Some(tint)) = tints.get(run.scan) {
+                    wide_colors = wide_colors || exact && points.into_par_iter().any(|i| tint.loses(source, i));
+                }
+                see.as_mut().map_or(Ok(()), |see| see(run, origin))
+            })?;
+        }
+        let scanners = scans.iter().map(|scan| is_of_scanner(scan.header, trusted)).collect();
+        Ok(Self { fields, origin, residuals, tints, wide_colors, scanners })
     }
-    let mut start = 0;
-    let scans = sources.iter().filter_map(|source| {
-        let points = start..start + source.len();
-        start = points.end;
-        let scan = || Scan { name: source.header.name.clone(), world_from_sensor: source.pose, points };
-        is_of_scanner(source.header, trusted).then(scan)
-    });
-    let scans: Vec<Scan> = scans.collect();
-    // The standard does not state which axis points up, but scanners stand upright, and programs that write E57 use Z
-    // up. A small cloud that no scanner saw is an object turned by hand.
-    if !scans.is_empty() || !cloud.is_small() {
-        cloud = cloud.with_axes(Axes::ZUp);
+
+    /// Most bytes of a point in memory.
+    pub(super) fn point_bytes(&self, exact: bool) -> usize {
+        let fields: usize = self.fields.iter().map(|field| field.kind.size()).sum();
+        12 + 3 + fields + if exact { 12 + 6 } else { 0 }
     }
-    Ok(cloud.with_scans(scans))
+
+    /// Makes the points of some runs. `done` is the finished fraction of the work.
+    pub(super) fn build(&self, job: &Job<'_>, runs: &[Run<'_>], done: f32) -> Result<PointCloud, Error> {
+        let Self { fields, origin, tints, .. } = self;
+        let lens: Vec<usize> = runs.iter().map(|run| run.source.len()).collect();
+        let steps = 2.0 + fields.len() as f32;
+        let part = |step: f32| ProgressRange { start: done + (1.0 - done) * step / steps, len: (1.0 - done) / steps };
+        let none = |step: f32| ProgressRange { len: 0.0, ..part(step) };
+        let world = |run: usize| {
+            let source = runs[run].source;
+            move |i| source.world(i) - *origin
+        };
+        let positions = fill(job, "positions", &lens, part(0.0), |run| {
+            let world = world(run);
+            move |i| world(i).as_vec3().to_array()
+        })?;
+        let mut cloud = PointCloud::new(*origin, positions);
+        if self.residuals {
+            let residuals = fill(job, "residuals", &lens, none(1.0), |run| {
+                let world = world(run);
+                move |i| residual(world(i))
+            })?;
+            cloud = cloud.with_residuals(residuals)?;
+        }
+        if !tints.is_empty() {
+            let tint = |run: usize| tints[runs[run].scan].map(|tint| (tint, runs[run].source));
+            let bytes = fill(job, "colours", &lens, part(1.0), |run| {
+                let tint = tint(run);
+                move |i| tint.map_or(GREY, |(tint, source)| tint.bytes(source, i))
+            })?;
+            cloud = cloud.with_colors(bytes)?;
+            let channels = ["Red", "Green", "Blue"].into_iter().enumerate();
+            for (channel, name) in channels.filter(|_| self.wide_colors) {
+                let wide = fill(job, name, &lens, none(2.0), |run| {
+                    let tint = tint(run);
+                    let grey = u16::from(GREY[channel]) * 257;
+                    move |i| tint.map_or(grey, |(tint, source)| tint.wide(source, channel, i))
+                })?;
+                cloud = cloud.with_field(name, FieldValues::U16(wide))?;
+            }
+        }
+        for (step, field) in fields.iter().enumerate() {
+            let mut values = field.kind.values();
+            macro_rules! filled {
+                ($v:ident, $read:ident, $absent:expr) => {
+                    *$v = fill(job, &field.name, &lens, part(2.0 + step as f32), |run| {
+                        let taken = field.of(runs[run].scan).map(|taken| (taken, runs[run].source));
+                        move |i| taken.map_or($absent, |(taken, source)| taken.$read(source, source.value_of(i)) as _)
+                    })?
+                };
+            }
+            use autosplats_cloud::FieldValues::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
+            match &mut values {
+                U8(v) => filled!(v, integer, 0),
+                I8(v) => filled!(v, integer, 0),
+                U16(v) => filled!(v, integer, 0),
+                I16(v) => filled!(v, integer, 0),
+                U32(v) => filled!(v, integer, 0),
+                I32(v) => filled!(v, integer, 0),
+                U64(v) => filled!(v, integer, 0),
+                I64(v) => filled!(v, integer, 0),
+                F32(v) => filled!(v, value, f32::NAN),
+                F64(v) => filled!(v, value, f64::NAN),
+            }
+            cloud = cloud.with_field(&field.name, values)?;
+        }
+        let mut start = 0;
+        let scans = runs.iter().filter_map(|Run { scan, source, .. }| {
+            let points = start..start + source.len();
+            start = points.end;
+            let of = || Scan { name: source.header.name.clone(), world_from_sensor: source.pose, points };
+            self.scanners[*scan].then(of)
+        });
+        Ok(cloud.with_scans(scans.collect()))
+    }
+
+    /// The axes. The standard does not state which axis points up, but scanners stand upright, and programs that write
+    /// E57 use Z up. A small cloud that no scanner saw is an object turned by hand.
+    pub(super) fn axes(&self, is_small: impl FnOnce() -> bool) -> Option<Axes> {
+        (self.scanners.contains(&true) || !is_small()).then_some(Axes::ZUp)
+    }
 }
 
 /// Whether points come from a scanner, not from a model or a merged cloud saved like a scan. Programs without a scanner
@@ -174,12 +309,12 @@ const NO_FIELDS: [&str; 11] = [
 ];
 
 /// The fields of all scans, in order of appearance.
-fn fields(job: &Job<'_>, sources: &[Source<'_>]) -> Vec<MergedField> {
+fn fields(job: &Job<'_>, scans: &[Kept<'_>]) -> Vec<MergedField> {
     let mut fields: Vec<MergedField> = Vec::new();
     let mut by_name: HashMap<String, usize> = HashMap::new();
     let mut left_out = 0;
-    for (index, source) in sources.iter().enumerate() {
-        for (name, kind, taken) in of_scan(job, source) {
+    for (index, scan) in scans.iter().enumerate() {
+        for (name, kind, taken) in of_scan(job, scan.header) {
             let next = fields.len();
             let at = *by_name.entry(name.clone()).or_insert(next);
             match fields.get_mut(at) {
@@ -199,13 +334,13 @@ fn fields(job: &Job<'_>, sources: &[Source<'_>]) -> Vec<MergedField> {
     if left_out > 0 {
         job.note(format!("{left_out} values per point are left out: their names repeat, or there are too many"));
     }
-    limit_fill(job, sources, &mut fields);
+    limit_fill(job, scans, &mut fields);
     fields
 }
 
 /// Drops fields that some scans lack if filling them up would take more memory than the file's size justifies.
-fn limit_fill(job: &Job<'_>, sources: &[Source<'_>], fields: &mut Vec<MergedField>) {
-    let total: usize = sources.iter().map(Source::len).sum();
+fn limit_fill(job: &Job<'_>, scans: &[Kept<'_>], fields: &mut Vec<MergedField>) {
+    let total: usize = scans.iter().map(|scan| scan.points).sum();
     let mut budget = job.bytes.len().saturating_mul(8).saturating_add(1 << 20);
     let (mut filled, mut dropped) = (Vec::new(), Vec::new());
     fields.retain_mut(|field| {
@@ -214,8 +349,8 @@ fn limit_fill(job: &Job<'_>, sources: &[Source<'_>], fields: &mut Vec<MergedFiel
                 FieldSource::Plain { element, .. } | FieldSource::Time { element, .. } => element,
                 FieldSource::Normal { elements, .. } => elements[0],
             };
-            let source = &sources[index];
-            (source.len(), source.header.elements[element].stored.bits() == 0)
+            let Kept { header, points } = scans[index];
+            (points, header.elements[element].stored.bits() == 0)
         };
         let have: usize = field.taken.iter().map(stored).map(|(len, _)| len).sum();
         let constant: usize =
@@ -250,9 +385,9 @@ fn limit_fill(job: &Job<'_>, sources: &[Source<'_>], fields: &mut Vec<MergedFiel
 }
 
 /// The fields of one scan: names, value types and sources.
-fn of_scan(job: &Job<'_>, source: &Source<'_>) -> Vec<(String, Kind, FieldSource)> {
-    let header = source.header;
-    let rows = DMat3::from_mat4(source.pose).transpose();
+fn of_scan(job: &Job<'_>, header: &ScanHeader) -> Vec<(String, Kind, FieldSource)> {
+    let pose = header.pose.unwrap_or(DMat4::IDENTITY);
+    let rows = DMat3::from_mat4(pose).transpose();
     let normals = ["normalX", "normalY", "normalZ"]
         .map(|name| header.elements.iter().position(|element| element.prefix.is_some() && element.name == name));
     let normals = match normals {
@@ -270,7 +405,7 @@ fn of_scan(job: &Job<'_>, source: &Source<'_>) -> Vec<(String, Kind, FieldSource
             continue;
         }
         if let Some(axis) = normals.and_then(|normals| normals.iter().position(|&normal| normal == index)) {
-            let turned = if source.pose == DMat4::IDENTITY { DMat3::IDENTITY } else { rows };
+            let turned = if pose == DMat4::IDENTITY { DMat3::IDENTITY } else { rows };
             let taken = FieldSource::Normal { elements: normals.unwrap_or_default(), row: turned.col(axis) };
             let kind = if kind == Kind::Single { kind } else { Kind::Double };
             fields.push((format!("Normal{}", ["X", "Y", "Z"][axis]), kind, taken));

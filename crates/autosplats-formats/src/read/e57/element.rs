@@ -153,6 +153,8 @@ pub(super) struct Stream {
     /// The packed values, followed by [`PADDING`](Self::PADDING) bytes.
     pub(super) bytes: Vec<u8>,
     stored: Stored,
+    /// Bits before the first value.
+    skipped: usize,
     bits: u32,
     mask: u64,
 }
@@ -163,13 +165,18 @@ impl Stream {
 
     pub(super) fn new(bytes: Vec<u8>, stored: Stored) -> Self {
         let bits = stored.bits();
-        Self { bytes, stored, bits, mask: u64::MAX.checked_shr(64 - bits).unwrap_or(0) }
+        Self { bytes, stored, skipped: 0, bits, mask: u64::MAX.checked_shr(64 - bits).unwrap_or(0) }
+    }
+
+    /// The same bytes without their first bits.
+    pub(super) fn skipping(self, bits: usize) -> Self {
+        Self { skipped: bits, ..self }
     }
 
     /// The raw bits of a value.
     #[inline]
     fn raw(&self, index: usize) -> u64 {
-        let bit = index * self.bits as usize;
+        let bit = self.skipped + index * self.bits as usize;
         let (at, shift) = (bit / 8, bit as u32 % 8);
         let mut raw = [0; 8];
         raw.copy_from_slice(&self.bytes[at..at + 8]);
@@ -223,9 +230,11 @@ mod tests {
                     bytes[at / 8] |= ((value >> bit & 1) as u8) << (at % 8);
                 }
             }
-            let stream = Stream::new(bytes, stored);
+            let stream = Stream::new(bytes.clone(), stored);
+            let later = Stream::new(bytes, stored).skipping(3 * bits as usize);
             for (i, value) in values.iter().enumerate() {
                 assert_eq!(stream.integer(i), min.wrapping_add(*value as i64), "{bits} bits, value {i}");
+                assert!(i < 3 || later.integer(i - 3) == stream.integer(i), "{bits} bits, value {i} after three");
             }
         }
     }

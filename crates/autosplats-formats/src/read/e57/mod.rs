@@ -13,16 +13,21 @@ mod describe;
 mod element;
 mod packets;
 mod pages;
+pub(super) mod parts;
 mod repair;
 mod source;
 mod xml;
 
 use autosplats_cloud::{Contents, Error};
 
+use std::ops::Range;
+
 use self::{
+    cloud::{Kept, Run, Settled},
+    packets::Packets,
     pages::Pages,
-    source::{Dropped, Source},
-    xml::{ScanHeader, open},
+    source::{Counts, Dropped, Source},
+    xml::{Root, ScanHeader, open},
 };
 use super::{Format, Job, columns::MAX_COLUMNS};
 
@@ -46,35 +51,71 @@ pub(super) const FORMAT: Format = Format {
 
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let (pages, root) = open(job)?;
+    let sources = scans(job, &pages, &root, GATHERING, |header, packets, part| {
+        let values = packets.values(job, &pages, header, 0..packets.count, part)?;
+        let mut source = Source::new(job, header, values)?;
+        let counts = source.counts();
+        source.keep_measured(&counts);
+        if job.progress.wants_chunks() {
+            cloud::preview(job, &source)?;
+        }
+        Ok((source, counts))
+    })?;
+    let kept: Vec<Kept<'_>> =
+        sources.iter().map(|source| Kept { header: source.header, points: source.len() }).collect();
+    let runs: Vec<Run<'_>> = sources.iter().enumerate().map(|(scan, source)| Run { scan, source, first: 0 }).collect();
+    let settled = Settled::of(job, &kept, root.is_ours(), &mut |see| runs.iter().try_for_each(see), None)?;
+    let total = kept.iter().map(|kept| kept.points).sum();
+    job.check_memory(total, settled.point_bytes(job.options.exact))?;
+    let mut cloud = settled.build(job, &runs, GATHERING)?;
+    if let Some(axes) = settled.axes(|| cloud.is_small()) {
+        cloud = cloud.with_axes(axes);
+    }
+    Ok(cloud.with_crs(root.crs).into())
+}
+
+/// Finds the points of all scans, and tells what is lost. `get` makes something of each scan, and counts its points;
+/// `share` is the share of the work.
+fn scans<'a, T>(
+    job: &Job<'_>,
+    pages: &Pages<'_>,
+    root: &'a Root,
+    share: f32,
+    mut get: impl FnMut(&'a ScanHeader, Packets, Range<f32>) -> Result<(T, Counts), Error>,
+) -> Result<Vec<T>, Error> {
     root.notes.iter().for_each(|note| job.note(note));
     if pages.cut_off() {
         job.note(format!("the file is cut off at byte {}; what is left is read", job.bytes.len()));
     }
     let mut left = job.bytes.len();
     let mut done = 0.0;
-    let mut sources: Vec<Source<'_>> = Vec::new();
-    let mut dropped = Dropped::default();
+    let (mut found, mut points, mut dropped) = (Vec::new(), 0, Dropped::default());
     let in_xml = |(scan, what): &(String, String)| (scan.clone(), "XML section".to_owned(), what.clone());
     let mut faults: Vec<_> = root.faults.iter().map(in_xml).collect();
     let mut told = Vec::new();
     for header in &root.scans {
-        let share = GATHERING / root.scans.len() as f32;
-        let source = source(job, &pages, header, (&mut left, &mut dropped), done..done + share);
-        done += share;
-        match source {
-            Ok(source) => {
-                told.extend(losses(header, &source).map(|what| format!("{}: {what}", header.shown())));
-                if job.progress.wants_chunks() {
-                    cloud::preview(job, &source)?;
-                }
-                sources.push(source);
+        let part = done..done + share / root.scans.len() as f32;
+        done = part.end;
+        let mut scan = || {
+            if header.elements.len() > MAX_COLUMNS {
+                let what = format!("{} values a point; at most {MAX_COLUMNS}", header.elements.len());
+                return Err(job.malformed("XML section", what));
+            }
+            get(header, packets::find(job, pages, header, &mut left)?, part.clone())
+        };
+        match scan() {
+            Ok((scan, counts)) => {
+                told.extend(losses(header, counts.values).map(|what| format!("{}: {what}", header.shown())));
+                points += counts.kept();
+                dropped.add(&counts);
+                found.push(scan);
             }
             Err(Error::Malformed { place, what, .. }) => faults.push((header.shown(), place, what)),
             Err(other) => return Err(other),
         }
     }
     if let Some((scan, place, what)) = faults.first() {
-        if sources.iter().all(|source| source.len() == 0) {
+        if points == 0 {
             return Err(job.malformed(place, format!("{scan}: {what}")));
         }
         told.extend(faults.iter().map(|(scan, place, what)| format!("{scan} is left out: {place}: {what}")));
@@ -84,28 +125,12 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         job.note(format!("{} more losses in scans", told.len() - MAX_NOTED_LOSSES));
     }
     dropped.note(job);
-    Ok(cloud::cloud(job, &sources, root.is_ours(), GATHERING)?.with_crs(root.crs).into())
-}
-
-/// Reads the values of one scan.
-fn source<'a>(
-    job: &Job<'_>,
-    pages: &Pages<'_>,
-    header: &'a ScanHeader,
-    (left, dropped): (&mut usize, &mut Dropped),
-    part: std::ops::Range<f32>,
-) -> Result<Source<'a>, Error> {
-    if header.elements.len() > MAX_COLUMNS {
-        let what = format!("{} values a point; at most {MAX_COLUMNS}", header.elements.len());
-        return Err(job.malformed("XML section", what));
-    }
-    let values = packets::gather(job, pages, header, left, part)?;
-    Source::new(job, header, values, dropped)
+    Ok(found)
 }
 
 /// Descriptions of what is missing or not read of a scan.
-fn losses(header: &ScanHeader, source: &Source<'_>) -> impl Iterator<Item = String> {
-    let (count, points) = (source.values.count, header.points);
+fn losses(header: &ScanHeader, count: usize) -> impl Iterator<Item = String> {
+    let points = header.points;
     let cut = ((count as u64) < points).then(|| format!("the data end after {count} of {points} points"));
     let text = header.elements.iter().any(|element| element.stored == element::Stored::Text);
     header.pose_note.clone().into_iter().chain(cut).chain(text.then(|| "values that are text are left out".into()))

@@ -37,20 +37,22 @@ struct Group {
     filled: Vec<usize>,
 }
 
-/// Joins the values of a scan. `left` is the number of the file's bytes that earlier scans have not used. No byte
-/// belongs to two scans, so memory stays within the file's size. `part` is the range of the work.
-pub(super) fn gather(
-    job: &Job<'_>,
-    pages: &Pages<'_>,
-    scan: &ScanHeader,
-    left: &mut usize,
-    part: Range<f32>,
-) -> Result<Values, Error> {
-    let stored = || scan.elements.iter().map(|element| element.stored);
+/// Where the values of a scan are.
+pub(super) struct Packets {
+    /// Number of points; lower than claimed if the data end early.
+    pub(super) count: usize,
+    groups: Vec<Group>,
+    /// Bytes in each stream.
+    filled: Vec<usize>,
+}
+
+/// Finds the packets of a scan and verifies them. `left` is the number of the file's bytes that earlier scans have not
+/// used. No byte belongs to two scans, so memory stays within the file's size.
+pub(super) fn find(job: &Job<'_>, pages: &Pages<'_>, scan: &ScanHeader, left: &mut usize) -> Result<Packets, Error> {
     if scan.points == 0 {
-        let streams = stored().map(|stored| Stream::new(vec![0; Stream::PADDING], stored)).collect();
-        return Ok(Values { count: 0, streams });
+        return Ok(Packets { count: 0, groups: Vec::new(), filled: vec![0; scan.elements.len()] });
     }
+    let stored = || scan.elements.iter().map(|element| element.stored);
     let section = section(job, pages, scan)?;
     let needed: Vec<u128> =
         stored().map(|stored| (u128::from(scan.points) * u128::from(stored.bits())).div_ceil(8)).collect();
@@ -67,17 +69,54 @@ pub(super) fn gather(
         let what = format!("{} points in {bytes} bytes, less than a byte each; that is implausible", scan.points);
         return Err(job.malformed(format!("byte {}", scan.offset), what));
     }
+    Ok(Packets { count: count as usize, groups, filled })
+}
 
-    let mut buffers = Vec::new();
-    for (&bytes, element) in filled.iter().zip(&scan.elements) {
-        let mut buffer = Vec::new();
-        reserve(&mut buffer, bytes + Stream::PADDING, &element.name)?;
-        buffer.resize(bytes + Stream::PADDING, 0);
-        buffers.push(buffer);
+impl Packets {
+    /// Joins the values of a range of points. `part` is the range of the work.
+    pub(super) fn values(
+        &self,
+        job: &Job<'_>,
+        pages: &Pages<'_>,
+        scan: &ScanHeader,
+        points: Range<usize>,
+        part: Range<f32>,
+    ) -> Result<Values, Error> {
+        let bits: Vec<usize> = scan.elements.iter().map(|element| element.stored.bits() as usize).collect();
+        let groups = self.groups_of(&bits, &points);
+        let before = |group: usize| self.groups.get(group).map_or(&self.filled, |group| &group.filled);
+        let (start, end) = (before(groups.start), before(groups.end));
+        let mut buffers = Vec::new();
+        for ((start, end), element) in start.iter().zip(end).zip(&scan.elements) {
+            let mut buffer = Vec::new();
+            reserve(&mut buffer, end - start + Stream::PADDING, &element.name)?;
+            buffer.resize(end - start + Stream::PADDING, 0);
+            buffers.push(buffer);
+        }
+        copy(job, pages, &self.groups[groups], end, &mut buffers, part)?;
+        let streams = buffers.into_iter().zip(&scan.elements).zip(bits.iter().zip(start));
+        let streams = streams.map(|((buffer, element), (&bits, &start))| {
+            // Constants take no bits, and are wherever one looks for them.
+            let skipped = (points.start * bits).saturating_sub(8 * start);
+            Stream::new(buffer, element.stored).skipping(if bits > 0 { skipped } else { 0 })
+        });
+        Ok(Values { count: points.len(), streams: streams.collect() })
     }
-    copy(job, pages, &groups, &filled, &mut buffers, part)?;
-    let streams = buffers.into_iter().zip(stored()).map(|(buffer, stored)| Stream::new(buffer, stored)).collect();
-    Ok(Values { count: count as usize, streams })
+
+    /// The groups that hold values of a range of points; all for all points.
+    fn groups_of(&self, bits: &[usize], points: &Range<usize>) -> Range<usize> {
+        if *points == (0..self.count) {
+            return 0..self.groups.len();
+        }
+        let (mut first, mut end) = (self.groups.len(), 0);
+        for (stream, &bits) in bits.iter().enumerate().filter(|(_, bits)| **bits > 0) {
+            let (low, high) = (points.start * bits / 8, (points.end * bits).div_ceil(8));
+            let starts = |limit: usize| self.groups.partition_point(|group| group.filled[stream] <= limit);
+            first = first.min(starts(low).saturating_sub(1));
+            end = end.max(starts(high.saturating_sub(1)));
+        }
+        first.min(end)..end
+    }
 }
 
 /// The byte range of the packets of a scan.
@@ -89,7 +128,7 @@ fn section(job: &Job<'_>, pages: &Pages<'_>, scan: &ScanHeader) -> Result<Range<
     }
     pages.check(job, start..start + SECTION_HEADER)?;
     let mut header = [0; SECTION_HEADER];
-    pages.copy(start, &mut header);
+    pages.copy(start, &mut header)?;
     if header[0] != 1 {
         return Err(fail("there is no compressed vector, where the points should be; write the file again"));
     }
@@ -119,7 +158,7 @@ fn survey(
     let mut at = section.start;
     let mut enough = false;
     while at < section.end && !enough {
-        if groups.last().is_none_or(|group| at - group.range.start >= GROUP) {
+        if groups.last().is_none_or(|group| at - group.range.start >= pages.step(GROUP)) {
             job.go_on()?;
             groups.push(Group { range: at..at, filled: filled.clone() });
         }
@@ -168,7 +207,7 @@ fn packet(
     let fail = |what: String| job.malformed(format!("byte {}", pages.physical(at)), what);
     let mut header = [0; 6];
     let short = range.len() < header.len();
-    pages.copy(at, &mut header[..range.len().min(6)]);
+    pages.copy(at, &mut header[..range.len().min(6)])?;
     let end = at + usize::from(u16::from_le_bytes([header[2], header[3]])) + 1;
     lengths.clear();
     if header[0] > 2 || end - at < 4 {
@@ -186,7 +225,7 @@ fn packet(
         return Err(fail(format!("a packet of {count} values where points have {streams}; copy the file again")));
     }
     lengths.resize(count, 0);
-    pages.copy(at + 6, bytemuck::cast_slice_mut(lengths));
+    pages.copy(at + 6, bytemuck::cast_slice_mut(lengths))?;
     lengths.iter_mut().for_each(|length| *length = u16::from_le(*length));
     if lengths.iter().map(|&length| usize::from(length)).sum::<usize>() > end - data {
         return Err(fail("a packet is too short for what it should hold; copy the file again".into()));
@@ -217,14 +256,15 @@ fn copy(
         });
         let places: Vec<_> = places.collect();
         places.into_par_iter().try_for_each(|(group, mut slices)| {
-            let mut lengths = Vec::new();
+            let (mut lengths, mut space) = (Vec::new(), Vec::new());
+            let near = pages.near(group.range.clone(), &mut space)?;
             let mut at = group.range.start;
             while at < group.range.end {
-                let packet = packet(job, pages, at..pages.len(), slices.len(), &mut lengths)?;
+                let packet = packet(job, &near, at..pages.len(), slices.len(), &mut lengths)?;
                 let mut from = packet.start;
                 for (slice, &length) in slices.iter_mut().zip(&lengths) {
                     let (now, later) = std::mem::take(slice).split_at_mut(length.into());
-                    pages.copy(from, now);
+                    near.copy(from, now)?;
                     *slice = later;
                     from += now.len();
                 }

@@ -28,13 +28,8 @@ enum Coordinates {
 }
 
 impl<'a> Source<'a> {
-    /// Finds the points of a scan that have a position, and counts the others in `dropped`.
-    pub(super) fn new(
-        job: &Job<'_>,
-        header: &'a ScanHeader,
-        values: Values,
-        dropped: &mut Dropped,
-    ) -> Result<Self, Error> {
+    /// Finds the coordinates among the values. All points are kept at first.
+    pub(super) fn new(job: &Job<'_>, header: &'a ScanHeader, values: Values) -> Result<Self, Error> {
         let cartesian = header.elements(["cartesianX", "cartesianY", "cartesianZ"]);
         let spherical = header.elements(["sphericalRange", "sphericalAzimuth", "sphericalElevation"]);
         let (coordinates, state) = match (cartesian, spherical) {
@@ -45,7 +40,10 @@ impl<'a> Source<'a> {
                 return Err(job.malformed("XML section", what));
             }
         };
-        let mut source = Self {
+        if u32::try_from(values.count).is_err() {
+            return Err(job.unsupported("more than 4 billion points in a scan; split it"));
+        }
+        Ok(Self {
             header,
             coordinates,
             pose: header.pose.unwrap_or(DMat4::IDENTITY),
@@ -53,38 +51,40 @@ impl<'a> Source<'a> {
             keep: None,
             keep_invalid: job.options.keep_no_returns,
             values,
-        };
-        if u32::try_from(source.values.count).is_err() {
-            return Err(job.unsupported("more than 4 billion points in a scan; split it"));
-        }
-        if !job.options.keep_no_returns {
-            source.keep = source.measured(dropped);
-        }
-        Ok(source)
+        })
     }
 
-    /// Indices of the points with a position; `None` if all have one.
-    fn measured(&self, dropped: &mut Dropped) -> Option<Vec<u32>> {
+    /// Counts the points without a position, unless they are kept too.
+    pub(super) fn counts(&self) -> Counts {
         let count = self.values.count as u32;
-        let direction_only = |i: &u32| self.state(*i as usize) == 1;
+        if self.keep_invalid {
+            return Counts { values: self.values.count, ..Counts::default() };
+        }
+        let number = |is: &(dyn Fn(u32) -> bool + Sync)| (0..count).into_par_iter().filter(|&i| is(i)).count();
         let invalid = |i: u32| self.state(i as usize) != 0;
-        let at_scanner = |i: u32| !invalid(i) && self.is_scanner(i as usize);
         let [directions, without] = match self.state {
             None => [0; 2],
-            Some(_) => [
-                (0..count).into_par_iter().filter(direction_only).count(),
-                (0..count).into_par_iter().filter(|&i| invalid(i)).count(),
-            ],
+            Some(_) => [number(&|i| self.state(i as usize) == 1), number(&invalid)],
         };
-        let zeros = (0..count).into_par_iter().filter(|&i| at_scanner(i)).count();
-        // A single point at the scanner may be real. If all points are there, the file means something else by it.
-        let drop_zeros = zeros > 1 && zeros < count as usize - without;
-        dropped.directions += directions;
-        dropped.nothing += without - directions;
-        dropped.at_scanner += if drop_zeros { zeros } else { 0 };
-        dropped.kept_at_scanner += if drop_zeros || zeros < 2 { 0 } else { zeros };
-        let keep = |i: &u32| !(invalid(*i) || drop_zeros && at_scanner(*i));
-        (without > 0 || drop_zeros).then(|| (0..count).into_par_iter().filter(keep).collect())
+        let at_scanner = number(&|i| self.is_at_scanner(i as usize));
+        Counts { values: self.values.count, directions, without, at_scanner }
+    }
+
+    /// Keeps the points with a position. The counts are of the whole scan.
+    pub(super) fn keep_measured(&mut self, counts: &Counts) {
+        let drops_zeros = counts.drops_zeros();
+        let keep = |i: &u32| {
+            let value = *i as usize;
+            self.state(value) == 0 && !(drops_zeros && self.is_at_scanner(value))
+        };
+        if counts.without > 0 || drops_zeros {
+            self.keep = Some((0..self.values.count as u32).into_par_iter().filter(keep).collect());
+        }
+    }
+
+    /// Whether a point has a position, which is the scanner's own.
+    fn is_at_scanner(&self, value: usize) -> bool {
+        self.state(value) == 0 && self.is_scanner(value)
     }
 
     /// Invalid state of a point: 0 for a position, 1 for a direction only, 2 for neither.
@@ -135,6 +135,39 @@ impl<'a> Source<'a> {
     }
 }
 
+/// Numbers of a scan's points. Those of its parts can be added.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Counts {
+    /// All points.
+    pub(super) values: usize,
+    /// Those of which only the direction is known.
+    directions: usize,
+    /// Those without a position, including the above.
+    without: usize,
+    /// Those at the scanner's own place.
+    at_scanner: usize,
+}
+
+impl Counts {
+    pub(super) fn add(&mut self, other: Self) {
+        self.values += other.values;
+        self.directions += other.directions;
+        self.without += other.without;
+        self.at_scanner += other.at_scanner;
+    }
+
+    /// Whether points at the scanner are dropped. A single one may be real. If all points are there, the file means
+    /// something else by it.
+    fn drops_zeros(&self) -> bool {
+        self.at_scanner > 1 && self.at_scanner < self.values - self.without
+    }
+
+    /// Number of points that are kept.
+    pub(super) fn kept(&self) -> usize {
+        self.values - self.without - if self.drops_zeros() { self.at_scanner } else { 0 }
+    }
+}
+
 /// Counts of the points without a position, over all scans.
 #[derive(Default)]
 pub(super) struct Dropped {
@@ -146,6 +179,15 @@ pub(super) struct Dropped {
 }
 
 impl Dropped {
+    /// Adds those of a scan.
+    pub(super) fn add(&mut self, counts: &Counts) {
+        let Counts { directions, without, at_scanner, .. } = *counts;
+        self.directions += directions;
+        self.nothing += without - directions;
+        self.at_scanner += if counts.drops_zeros() { at_scanner } else { 0 };
+        self.kept_at_scanner += if counts.drops_zeros() || at_scanner < 2 { 0 } else { at_scanner };
+    }
+
     pub(super) fn note(&self, job: &Job<'_>) {
         let counts = [
             (self.nothing, "points without a return are dropped"),

@@ -301,9 +301,14 @@ impl<'a> Columns<'a> {
         self.finish()
     }
 
-    /// What the points show.
-    pub(super) fn into_facts(self) -> ValueFacts {
-        self.seen
+    /// What the points show, and how many are at (0, 0, 0).
+    pub(super) fn into_facts(self) -> Result<(ValueFacts, usize), Error> {
+        let Self { origin, positions, residuals, seen, .. } = self;
+        let mut cloud = PointCloud::new(origin, positions);
+        if seen.residuals {
+            cloud = cloud.with_residuals(residuals)?;
+        }
+        Ok((seen, cloud.no_returns()))
     }
 
     fn finish(self) -> Result<PointCloud, Error> {

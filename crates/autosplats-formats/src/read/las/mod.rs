@@ -20,7 +20,7 @@ mod gps_time;
 mod head;
 mod header;
 mod laz;
-mod parts;
+pub(super) mod parts;
 mod point14;
 mod records;
 mod shape;
@@ -31,7 +31,6 @@ pub(crate) use self::{
     chunks::MAX_RATIO,
     columns::{Colors, narrow_note},
     head::Head,
-    parts::LasParts,
     shape::{Decoded, Shape, read_shaped},
     stream::{Facts, Space, Stream},
 };

@@ -5,13 +5,9 @@
 //! Opening reads all points once: which fields are zero at every point, whether colours have 8 or 16 bits, and whether
 //! positions need residuals is known only then. So the parts are those of the cloud that reading the whole file gives.
 
-use std::{
-    ops::Range,
-    path::{Path, PathBuf},
-    sync::Mutex,
-};
+use std::{ops::Range, sync::Mutex};
 
-use autosplats_cloud::{Bytes, Clouds, Crs, Error, PointCloud, Progress, lock};
+use autosplats_cloud::{Crs, Error, PointCloud, Progress, lock};
 use glam::DVec3;
 
 use super::{
@@ -20,17 +16,18 @@ use super::{
     cut_off, damage,
     dimension::Dimension,
     header::Header,
-    open,
     stream::{Space, Stream},
 };
-use crate::read::{ReadOptions, units};
+use crate::read::{
+    opened::Reader,
+    pieces::{Opening, Pieces, Seen},
+};
 
 /// Most points of a part, unless a chunk has more, of which pieces are parts.
 const PART: usize = 1 << 20;
 
 /// A LAS or LAZ file.
-pub(crate) struct LasParts {
-    path: PathBuf,
+struct LasParts {
     stream: Stream,
     header: Header,
     dimensions: Vec<Dimension>,
@@ -38,46 +35,46 @@ pub(crate) struct LasParts {
     origin: DVec3,
     exact: bool,
     facts: ValueFacts,
-    /// Number of points that can be read.
-    points: u64,
+}
+
+/// Opens a file, and reads all points for what they show.
+pub(in super::super) fn open(job: &Job<'_>, _file: &Reader<'_>) -> Result<Option<Opening>, Error> {
+    let Some(stream) = Stream::open(job.path)? else { return Ok(None) };
+    let Opened { header, dimensions, lost, crs, origin, notes: [notes, after], .. } =
+        super::open(job, &Shape::default())?;
+    let (claimed, points) = (header.points, stream.facts.points);
+    let parts = LasParts {
+        stream,
+        header,
+        dimensions,
+        crs: crs.clone(),
+        origin,
+        exact: job.options.exact,
+        facts: ValueFacts::default(),
+    };
+    let (mut facts, mut seen, mut why) = (ValueFacts::default(), Seen::default(), String::new());
+    parts.each(Colors::Settled { wide: false }, job.progress, &mut |columns, count, fault| {
+        let (own, at_zero) = columns.into_facts()?;
+        facts.add(&own);
+        seen.points += count;
+        seen.at_zero += at_zero;
+        if why.is_empty() {
+            why = fault;
+        }
+        Ok(())
+    })?;
+    if seen.points == 0 && points > 0 {
+        return Err(job.malformed("point 1", why));
+    }
+    let damaged = points - seen.points as u64;
+    let about = [facts.narrow_note(), cut_off(lost, claimed), damage(damaged, claimed)];
+    let all = notes.into_iter().chain(about.into_iter().flatten()).chain(after);
+    all.for_each(|note| job.note(note));
+    let pieces = Box::new(LasParts { facts, ..parts });
+    Ok(Some(Opening { pieces, seen, scans: Vec::new(), crs }))
 }
 
 impl LasParts {
-    /// Opens a file, and reads all points for what they show. `None` if it is another format.
-    pub(crate) fn open(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<Option<Self>, Error> {
-        let Some(stream) = Stream::open(path)? else { return Ok(None) };
-        let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
-        let job = Job { path, progress, bytes: &bytes, options, triangles: false };
-        let Opened { header, dimensions, lost, crs, origin, notes: [notes, after], .. } =
-            open(&job, &Shape::default())?;
-        let exact = options.exact;
-        let path = path.to_owned();
-        let facts = ValueFacts::default();
-        let points = stream.facts.points;
-        let mut parts = Self { path, stream, header, dimensions, crs, origin, exact, facts, points };
-        let (mut facts, mut held, mut why) = (ValueFacts::default(), 0, String::new());
-        parts.each(Colors::Settled { wide: false }, progress, &mut |columns, count, fault| {
-            facts.add(&columns.into_facts());
-            held += count as u64;
-            if why.is_empty() {
-                why = fault;
-            }
-            Ok(())
-        })?;
-        (parts.facts, parts.points) = (facts, held);
-        let damaged = points - held;
-        if held == 0 && points > 0 {
-            return Err(job.malformed("point 1", why));
-        }
-        let claimed = parts.header.points;
-        let about = [parts.facts.narrow_note(), cut_off(lost, claimed), damage(damaged, claimed)];
-        let all = notes.into_iter().chain(about.into_iter().flatten()).chain(after);
-        all.for_each(|note| job.note(note));
-        // Of no points, this tells how units are settled.
-        units::settle(&job, &mut PointCloud::default().with_crs(parts.crs.clone()))?;
-        Ok(Some(parts))
-    }
-
     /// Passes on columns of all points, with the number of their points, and why others are missing.
     fn each(
         &self,
@@ -162,27 +159,19 @@ impl LasParts {
     }
 }
 
-impl Clouds for LasParts {
-    fn name(&self) -> &Path {
-        &self.path
-    }
-
-    fn points(&self) -> Option<u64> {
-        Some(self.points)
-    }
-
+impl Pieces for LasParts {
     fn read(
         &self,
-        progress: &dyn Progress,
-        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
+        job: &Job<'_>,
+        _file: &Reader<'_>,
+        take: &mut dyn FnMut(PointCloud, Option<usize>) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        self.each(self.facts.colors(), progress, &mut |columns, count, _| {
+        self.each(self.facts.colors(), job.progress, &mut |columns, count, _| {
             if count == 0 {
                 return Ok(());
             }
             let cloud = columns.into_part(&self.facts)?;
-            let cloud = cloud.with_crs(self.crs.clone()).with_resolution(self.header.scale.abs());
-            take(&units::settled(&self.path, cloud)?)
+            take(cloud.with_crs(self.crs.clone()).with_resolution(self.header.scale.abs()), None)
         })
     }
 }

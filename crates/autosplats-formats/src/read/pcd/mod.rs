@@ -1,26 +1,29 @@
 //! PCD: ascii, binary and binary_compressed.
 
+mod frame;
 mod header;
 mod lzf;
+pub(super) mod parts;
 
-use autosplats_cloud::{Axes, Contents, Error, PointCloud, Scan, excerpt};
-use glam::{DMat4, DVec3};
+use autosplats_cloud::{Contents, Error, excerpt};
+use glam::DVec3;
 
-use self::header::{Encoding, Header, Viewpoint};
+use self::{
+    frame::{Frame, InFront, image_from_origin, may_be_seen_from_origin, ray, sampled_pairs, scans},
+    header::{Encoding, Header, Viewpoint},
+};
 use super::{
     Attribute, Description, Format, Job,
     body::Body,
     columns::{MAX_COUNT, numbered, unrepeated},
-    table::{Column, ProgressRange, Table, reserve},
-    text::{Rows, TEXT, Token, is_coordinate},
+    records::Records,
+    table::{Column, Table, reserve},
+    text::{TEXT, Token, is_coordinate},
     xyz,
 };
 
 pub(super) const FORMAT: Format =
     Format { name: "PCD", extensions: &["pcd"], recognised: header::recognised, sensor_frame: true, describe, read };
-
-/// Share of the work that parsing text takes.
-const PARSING: ProgressRange = ProgressRange { start: 0.0, len: 0.8 };
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
     if without_header(job) {
@@ -78,93 +81,49 @@ pub(super) fn body(job: &Job<'_>) -> Result<(Body, usize, Option<usize>), Error>
     })
 }
 
-fn read(job: &Job<'_>) -> Result<Contents, Error> {
-    if without_header(job) {
-        job.note(NO_HEADER);
-        return (xyz::FORMAT.read)(job);
-    }
-    let header = Header::parse(job)?;
+/// Tells what is odd about the header. Returns the bytes of a binary point.
+fn check(job: &Job<'_>, header: &Header) -> Result<usize, Error> {
     header.tell_odd(job)?;
     let long = |field: &&header::Field| field.name != "_" && field.count > MAX_COUNT;
     for field in header.fields.iter().filter(long).take(MAX_NOTED_FIELDS) {
         let name = excerpt(field.name.as_bytes());
         job.note(format!("{name} has {} values a point; left out, {MAX_COUNT} at most are read", field.count));
     }
-    let stride = header.stride().ok_or_else(|| job.malformed("header", "a point is larger than any memory"))?;
+    header.stride().ok_or_else(|| job.malformed("header", "a point is larger than any memory"))
+}
+
+fn read(job: &Job<'_>) -> Result<Contents, Error> {
+    if without_header(job) {
+        job.note(NO_HEADER);
+        return (xyz::FORMAT.read)(job);
+    }
+    let header = Header::parse(job)?;
+    let stride = check(job, &header)?;
     let cloud = match header.encoding {
-        Encoding::Ascii => ascii(job, &header)?,
-        Encoding::Binary => {
-            job.check_not_text_converted(header.end)?;
-            let bytes = &job.bytes[header.end..];
-            let held = header.points.min(bytes.len() / stride.max(1));
-            job.tell_cut_off(held, header.points, "points")?;
-            let table = Table { count: held, ..table(&header, bytes, 0.0, |before, _| (before, stride)) };
-            table.preview(job, "header")?;
-            table.into_cloud(job, "header")?
-        }
+        Encoding::Ascii | Encoding::Binary => records(job, &header, stride)?.into_cloud(job)?,
         Encoding::Compressed => {
             job.check_not_text_converted(header.end)?;
             let bytes = decompress(job, &header, stride)?;
             // Compressed files hold all values of the first field, then all of the second, and so on.
-            let table = table(&header, &bytes, 0.5, |before, size| (before * header.points, size));
+            let columns = columns(&header, |before, size| (before * header.points, size));
+            let (count, big_endian, done) = (header.points, false, 0.5);
+            let table = Table { bytes: &bytes, count, big_endian, columns, packed_rgb: true, done };
             table.preview(job, "header")?;
             table.into_cloud(job, "header")?
         }
     };
-    let mut scans = scans(&header, cloud.len());
-    if scans.is_empty() && image_from_origin(&header, &cloud) {
-        scans.push(at_the_origin(cloud.len()));
-    }
-    let axes = header.axes.or_else(|| seen_from_origin(&header, &cloud).then_some(Axes::Camera));
-    let cloud = cloud.with_scans(scans);
-    Ok(if let Some(axes) = axes { cloud.with_axes(axes) } else { cloud }.into())
+    let from_origin = image_from_origin(&sampled_pairs(&header, cloud.len()), |i| ray(cloud.world_position(i)));
+    let may_be_seen = may_be_seen_from_origin(&header, cloud.origin());
+    let seen = may_be_seen.then(|| InFront::default().with(cloud.positions()));
+    let frame = Frame::of(&header, from_origin, cloud.colors().is_some(), seen);
+    Ok(frame.set(cloud).into())
 }
 
 /// Largest number of left-out fields that are noted one by one.
 const MAX_NOTED_FIELDS: usize = 10;
 
-/// Pairs of neighbours sampled to find out from where an image of points was taken.
-const MAX_SAMPLED_PAIRS: usize = 1 << 14;
-
-/// The sensor's pose, if VIEWPOINT is not the default, or if a file of this project states that the default is true.
-///
-/// Points are not moved by the pose. The format calls VIEWPOINT the place from which the points were acquired, not a
-/// transformation to apply, and other programs leave points unmoved.
-fn scans(header: &Header, points: usize) -> Vec<Scan> {
-    match header.viewpoint {
-        Viewpoint::At(world_from_sensor) => vec![Scan { name: None, world_from_sensor, points: 0..points }],
-        Viewpoint::Identity if header.knows_sensor => vec![at_the_origin(points)],
-        Viewpoint::Identity | Viewpoint::Broken => Vec::new(),
-    }
-}
-
-fn at_the_origin(points: usize) -> Scan {
-    Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..points }
-}
-
-/// Whether an organised cloud was taken from the origin, although its VIEWPOINT is the default. Seen from the sensor,
-/// neighbours in a row of the image have about the same angle between them, near or far. Moved points do not.
-fn image_from_origin(header: &Header, cloud: &PointCloud) -> bool {
-    let Some(width) =
-        header.width.filter(|&width| width > 0 && header.viewpoint == Viewpoint::Identity && header.height > 1)
-    else {
-        return false;
-    };
-    let ray = |i: usize| cloud.world_position(i).try_normalize().filter(|ray| ray.is_finite());
-    let step = cloud.len().div_ceil(MAX_SAMPLED_PAIRS).max(1);
-    let starts = (0..cloud.len().saturating_sub(1)).step_by(step).filter(|i| (i + 1) % width != 0);
-    let mut angles: Vec<f64> = starts.filter_map(|i| Some(ray(i)?.cross(ray(i + 1)?).length())).collect();
-    if angles.is_empty() {
-        return false;
-    }
-    angles.sort_unstable_by(f64::total_cmp);
-    let middle = angles[angles.len() / 2];
-    let even = angles.iter().filter(|&&angle| (0.3 * middle..=3.0 * middle).contains(&angle)).count();
-    middle > 0.0 && even * 10 >= angles.len() * 9
-}
-
-/// The columns over binary data. `place` maps the bytes before a field and its own to its offset and stride.
-fn table<'a>(header: &Header, bytes: &'a [u8], done: f32, place: impl Fn(usize, usize) -> (usize, usize)) -> Table<'a> {
+/// The values of a point. `place` maps the bytes before a field and its own to its offset and stride.
+fn columns(header: &Header, place: impl Fn(usize, usize) -> (usize, usize)) -> Vec<Column> {
     let mut columns = Vec::new();
     let mut before = 0;
     for field in &header.fields {
@@ -176,13 +135,20 @@ fn table<'a>(header: &Header, bytes: &'a [u8], done: f32, place: impl Fn(usize, 
         }
         before += size;
     }
-    Table { bytes, count: header.points, big_endian: false, columns, packed_rgb: true, done }
+    columns
 }
 
-fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
-    let mut columns = Vec::new();
-    let mut tokens = Vec::new();
-    let mut offset = 0;
+/// Where the records of the points are, of `stride` bytes if they are no text.
+fn records(job: &Job<'_>, header: &Header, stride: usize) -> Result<Records, Error> {
+    let (start, big_endian) = (header.end, false);
+    if header.encoding == Encoding::Binary {
+        job.check_not_text_converted(start)?;
+        let count = header.points.min((job.bytes.len() - start) / stride.max(1));
+        job.tell_cut_off(count, header.points, "points")?;
+        let columns = columns(header, |before, _| (before, stride));
+        return Ok(Records { columns, start, count, stride, big_endian, tokens: None });
+    }
+    let (mut columns, mut tokens, mut stride) = (Vec::new(), Vec::new(), 0);
     for field in &header.fields {
         let names = numbered(&field.name, field.count);
         if names.is_empty() {
@@ -195,21 +161,12 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
         }
         let (scalar, token) = Token::of(&field.name, field.scalar);
         for name in names {
-            columns.push(Column { name, scalar, offset, stride: 0 });
+            columns.push(Column { name, scalar, offset: stride, stride: 0 });
             tokens.push(token);
-            offset += token.size();
+            stride += token.size();
         }
     }
-    for column in &mut columns {
-        column.stride = offset;
-    }
-    let rows = Rows { tokens: &tokens, count: Some(header.points), may_be_cut: true };
-    let done = PARSING.len;
-    let (bytes, count) = rows.parse_and_show(job, header.end, PARSING, |bytes, count| {
-        Table { bytes, count, big_endian: false, columns: columns.clone(), packed_rgb: true, done }
-            .preview(job, "header")
-    })?;
-    Table { bytes: &bytes, count, big_endian: false, columns, packed_rgb: true, done }.into_cloud(job, "header")
+    Ok(Records { columns, start, count: header.points, stride, big_endian, tokens: Some(tokens) })
 }
 
 fn decompress(job: &Job<'_>, header: &Header, stride: usize) -> Result<Vec<u8>, Error> {
@@ -242,24 +199,4 @@ fn decompress(job: &Job<'_>, header: &Header, stride: usize) -> Result<Vec<u8>, 
         return Err(fail(header.end, &what));
     }
     Ok(bytes)
-}
-
-/// Largest range of depth cameras, in metres, with a margin.
-const DEPTH_CAMERA_RANGE: f32 = 20.0;
-
-/// Whether an image of points, or coloured points in a depth camera's range, are in the camera's frame: 99 % in front.
-fn seen_from_origin(header: &Header, cloud: &PointCloud) -> bool {
-    if header.viewpoint != Viewpoint::Identity || cloud.origin() != DVec3::ZERO {
-        return false;
-    }
-    let far = || cloud.positions().iter().flatten().any(|value| value.abs() > DEPTH_CAMERA_RANGE);
-    if header.height < 2 && (cloud.colors().is_none() || far()) {
-        return false;
-    }
-    let finite = cloud.positions().iter().filter(|point| point.iter().all(|value| value.is_finite()));
-    let (mut front, mut behind) = (0_usize, 0_usize);
-    for [_, _, z] in finite {
-        if *z > 0.0 { front += 1 } else { behind += 1 }
-    }
-    front > 0 && behind * 100 <= front
 }

@@ -4,6 +4,7 @@
 mod faces;
 mod header;
 mod length;
+pub(super) mod parts;
 mod walk;
 
 use autosplats_cloud::{Contents, Error, PointCloud, excerpt};
@@ -16,8 +17,9 @@ use self::{
 use super::{
     Attribute, Description, Format, Job,
     columns::unrepeated,
+    records::Records,
     table::{Column, ProgressRange, Table, reserve},
-    text::{Rows, TEXT, Token, is_coordinate},
+    text::{TEXT, Token, is_coordinate},
 };
 
 pub(super) const FORMAT: Format = Format {
@@ -35,7 +37,7 @@ const MAX_DESCRIBED_ELEMENTS: usize = 100;
 /// Largest file, in bytes, whose strips a description counts through; counting then takes milliseconds.
 const MAX_COUNTED_BYTES: usize = 4 << 20;
 
-/// Share of the work that packing text or lists into records takes.
+/// Share of the work that packing lists into records takes.
 const PACKING: ProgressRange = ProgressRange { start: 0.0, len: 0.8 };
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
@@ -74,21 +76,23 @@ fn vertices(job: &Job<'_>, header: &Header) -> Result<usize, Error> {
     index.ok_or_else(|| job.malformed("header", "there is no element 'vertex', so there are no points"))
 }
 
+/// Fails if the points cannot be read, and tells what is odd about the file.
+fn check(job: &Job<'_>, header: &Header, vertex: &Element) -> Result<(), Error> {
+    check_unknown_lines(job, header)?;
+    if vertex.properties.iter().any(|property| property.name == "packed_position") {
+        return Err(job.unsupported("compressed 3D Gaussian splats; export them as an uncompressed PLY"));
+    }
+    if header.encoding == Encoding::Ascii { Ok(()) } else { job.check_not_text_converted(header.end) }
+}
+
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let header = Header::parse(job)?;
     let index = vertices(job, &header)?;
     let (before, vertex) = (&header.elements[..index], &header.elements[index]);
-    check_unknown_lines(job, &header)?;
-    if vertex.properties.iter().any(|property| property.name == "packed_position") {
-        return Err(job.unsupported("compressed 3D Gaussian splats; export them as an uncompressed PLY"));
-    }
-    if header.encoding != Encoding::Ascii {
-        job.check_not_text_converted(header.end)?;
-    }
-    let cloud = match (header.encoding, vertex.stride()) {
-        (Encoding::Ascii, _) => ascii(job, &header, before, vertex)?,
-        (_, Some(stride)) => plain(job, &header, before, vertex, stride)?,
-        (_, None) => with_lists(job, &header, before, vertex)?,
+    check(job, &header, vertex)?;
+    let cloud = match records(job, &header, before, vertex)? {
+        Some(records) => records.into_cloud(job)?,
+        None => with_lists(job, &header, before, vertex)?,
     };
     let cloud = match header.axes {
         Some(axes) => cloud.with_axes(axes),
@@ -110,61 +114,47 @@ fn check_unknown_lines(job: &Job<'_>, header: &Header) -> Result<(), Error> {
     Ok(())
 }
 
-fn ascii(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<PointCloud, Error> {
-    let start = skip_rows(job, header, before, vertex)?;
-    let mut columns = Vec::new();
-    let mut tokens = Vec::new();
-    let mut offset = 0;
-    for property in &vertex.properties {
-        if property.list.is_some() {
-            tokens.push(Token::SkipList);
-            continue;
+/// Where the records of the points are; `None` if lists make their lengths unequal.
+fn records(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<Option<Records>, Error> {
+    if header.encoding == Encoding::Ascii {
+        let start = skip_rows(job, header, before, vertex)?;
+        let (mut columns, mut tokens, mut stride) = (Vec::new(), Vec::new(), 0);
+        for property in &vertex.properties {
+            if property.list.is_some() {
+                tokens.push(Token::SkipList);
+                continue;
+            }
+            let (scalar, token) = Token::of(&property.name, property.scalar);
+            columns.push(Column { name: property.name.clone(), scalar, offset: stride, stride: 0 });
+            tokens.push(token);
+            stride += token.size();
         }
-        let (scalar, token) = Token::of(&property.name, property.scalar);
-        columns.push(Column { name: property.name.clone(), scalar, offset, stride: 0 });
-        tokens.push(token);
-        offset += token.size();
+        let (count, tokens) = (vertex.count, Some(tokens));
+        return Ok(Some(Records { columns, start, count, stride, big_endian: false, tokens }));
     }
-    let rows = Rows { tokens: &tokens, count: Some(vertex.count), may_be_cut: true };
-    let (records, count) = rows.parse_and_show(job, start, PACKING, |records, count| {
-        packed_table(records, count, false, columns.clone(), offset).preview(job, "header")
-    })?;
-    packed_table(&records, count, false, columns, offset).into_cloud(job, "header")
+    let Some(stride) = vertex.stride() else { return Ok(None) };
+    let start = skip(job, header, before, vertex)?;
+    let count = vertex.count.min((job.bytes.len() - start) / stride.max(1));
+    job.tell_cut_off(count, vertex.count, "points")?;
+    let (columns, _) = columns(vertex);
+    Ok(Some(Records { columns, start, count, stride, big_endian: header.encoding == Encoding::Big, tokens: None }))
 }
 
-/// The fast path: records of equal length form a table in the file itself.
-fn plain(
-    job: &Job<'_>,
-    header: &Header,
-    before: &[Element],
-    vertex: &Element,
-    stride: usize,
-) -> Result<PointCloud, Error> {
-    let start = skip(job, header, before, vertex)?;
-    let bytes = &job.bytes[start..];
-    let count = vertex.count.min(bytes.len() / stride.max(1));
-    job.tell_cut_off(count, vertex.count, "points")?;
-    let mut offset = 0;
-    let columns = vertex.properties.iter().map(|property| {
-        offset += property.scalar.size();
-        Column { name: property.name.clone(), scalar: property.scalar, offset: offset - property.scalar.size(), stride }
-    });
-    let columns = columns.collect();
-    let big_endian = header.encoding == Encoding::Big;
-    let table = Table { bytes, count, big_endian, columns, packed_rgb: true, done: 0.0 };
-    table.preview(job, "header")?;
-    table.into_cloud(job, "header")
+/// The values of a binary record without its lists, and their bytes.
+fn columns(vertex: &Element) -> (Vec<Column>, usize) {
+    let (mut columns, mut stride) = (Vec::new(), 0);
+    for property in vertex.properties.iter().filter(|property| property.list.is_none()) {
+        columns.push(Column { name: property.name.clone(), scalar: property.scalar, offset: stride, stride: 0 });
+        stride += property.scalar.size();
+    }
+    (columns, stride)
 }
 
 /// Lists make records of unequal length, so the other values are packed first.
 fn with_lists(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<PointCloud, Error> {
     let start = skip(job, header, before, vertex)?;
-    let mut columns = Vec::new();
-    let mut stride = 0;
-    for property in vertex.properties.iter().filter(|property| property.list.is_none()) {
-        columns.push(Column { name: property.name.clone(), scalar: property.scalar, offset: stride, stride: 0 });
-        stride += property.scalar.size();
-    }
+    let (mut columns, stride) = columns(vertex);
+    columns.iter_mut().for_each(|column| column.stride = stride);
     let mut records = Vec::new();
     let Walked { count, .. } = walk(job, header, vertex, start, PACKING, |bytes| {
         reserve(&mut records, bytes.len(), "points with lists")?;
@@ -173,14 +163,8 @@ fn with_lists(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Eleme
     })?;
     job.tell_cut_off(count, vertex.count, "points")?;
     let big_endian = header.encoding == Encoding::Big;
-    let table = packed_table(&records, count, big_endian, columns, stride);
+    let table =
+        Table { bytes: &records, count, big_endian, columns, packed_rgb: true, done: PACKING.start + PACKING.len };
     table.preview(job, "header")?;
     table.into_cloud(job, "header")
-}
-
-fn packed_table(bytes: &[u8], count: usize, big_endian: bool, mut columns: Vec<Column>, stride: usize) -> Table<'_> {
-    for column in &mut columns {
-        column.stride = stride;
-    }
-    Table { bytes, count, big_endian, columns, packed_rgb: true, done: PACKING.start + PACKING.len }
 }

@@ -83,6 +83,12 @@ impl Layout {
         Ok(Some(layout))
     }
 
+    /// Most bytes of a point in memory.
+    pub(super) fn bytes_per_point(&self, exact: bool) -> usize {
+        let fields: usize = self.fields.iter().map(|(_, wide)| if *wide { 8 } else { 4 }).sum();
+        12 + if exact { 12 } else { 0 } + if self.has_color { 3 } else { 0 } + fields
+    }
+
     fn from_names(naming: Naming, dialect: Dialect, rows: &[Vec<Cell>], exact: bool) -> Self {
         let Naming { mut names, axes, open, crs, mut notes } = naming;
         let known: Vec<String> = names.iter().map(|name| name.clone().unwrap_or_default()).collect();

@@ -5,20 +5,35 @@
 //! normal, and seven both intensity and colour.
 
 mod cells;
+mod columns;
 mod dialect;
 mod guess;
 mod header;
 mod layout;
 mod naming;
 mod numbers;
+pub(super) mod parts;
 mod preamble;
 mod rows;
+mod settle;
+mod survey;
 
 use autosplats_cloud::{Contents, Error, PointCloud};
+use glam::DVec3;
 
 pub(super) use self::preamble::looks_like_rows;
-use self::{layout::Layout, preamble::Preamble};
-use super::{Attribute, Description, Format, Job};
+use self::{
+    columns::Columns,
+    layout::Layout,
+    preamble::Preamble,
+    rows::{Parser, Piece},
+    settle::Look,
+    survey::{Survey, survey},
+};
+use super::{Attribute, Description, Format, Job, cuts::Text, table::ProgressRange};
+
+/// Fraction of the work that parsing takes.
+const PARSING: f32 = 0.95;
 
 pub(super) const FORMAT: Format = Format {
     name: "text",
@@ -80,5 +95,40 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         };
     };
     layout.notes.iter().for_each(|note| job.note(note));
-    Ok(rows::read(job, &layout, preamble.start, preamble.promised)?.into())
+    Ok(points(job, &layout, &preamble)?.into())
+}
+
+/// Reads the rows. Besides the cloud, only one batch of pieces is in memory.
+fn points(job: &Job<'_>, layout: &Layout, preamble: &Preamble) -> Result<PointCloud, Error> {
+    let (text, start, exact) = (Text::Held(job.bytes), preamble.start, job.options.exact);
+    let Survey { origin, crs, row_len } = survey(job, layout, start);
+    job.check_memory((text.len() - start) / row_len, layout.bytes_per_point(exact))?;
+    let parser = Parser { layout, origin, exact, counts_between: preamble.promised.is_some() };
+    let (mut all, mut look) = (Columns::new(layout), Look::default());
+    let part = ProgressRange { start: 0.0, len: PARSING };
+    parser.each(job, text, start, part, |pieces| {
+        job.preview(|| preview(&Job { progress: &(), ..*job }, layout, origin, &pieces))?;
+        for piece in pieces {
+            all.append(&piece.columns)?;
+            look.add(piece.look);
+        }
+        Ok(())
+    })?;
+    look.check(job, &text, preamble.promised)?;
+    job.tick(PARSING)?;
+    let settled = look.settle(job, layout.has_color, origin, exact);
+    let mut cloud = all.into_cloud(layout, origin, &settled)?.with_crs(crs);
+    settled.drop_no_heights(&mut cloud);
+    Ok(cloud)
+}
+
+/// The points of some pieces, with what these alone tell.
+fn preview(job: &Job<'_>, layout: &Layout, origin: DVec3, pieces: &[Piece]) -> Result<PointCloud, Error> {
+    let (mut chunk, mut look) = (Columns::new(layout), Look::default());
+    for Piece { columns, .. } in pieces {
+        chunk.append(columns)?;
+        look.add(Look::of(columns, origin, false));
+    }
+    let settled = look.settle(job, layout.has_color, origin, false);
+    chunk.into_cloud(layout, origin, &settled)
 }
