@@ -304,8 +304,8 @@ fn hostile_files_are_named_each() {
 }
 
 /// Whether two values are the same, but for the last digits of sums.
-fn alike(a: &serde_json::Value, b: &serde_json::Value) -> bool {
-    use serde_json::Value::{Array, Number, Object};
+fn alike(a: &Value, b: &Value) -> bool {
+    use Value::{Array, Number, Object};
     match (a, b) {
         (Number(a), Number(b)) => {
             let [a, b] = [a, b].map(|number| number.as_f64().expect("a number"));
@@ -323,7 +323,7 @@ fn alike(a: &serde_json::Value, b: &serde_json::Value) -> bool {
 fn more_points_than_memory_holds_are_examined_in_parts() {
     let folder = Folder::new();
     folder.succeed(&["convert", "scene:figure:100K", "scan.laz"]);
-    let scan = |options: &[&str]| -> serde_json::Value {
+    let scan = |options: &[&str]| -> Value {
         let outcome = folder.succeed(&[&["info", "scan.laz", "--scan", "--json"], options].concat());
         serde_json::from_str(&outcome.stdout).expect("JSON")
     };
