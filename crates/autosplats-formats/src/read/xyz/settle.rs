@@ -36,7 +36,7 @@ impl Look {
         let (floats, above_one, fractions, colors) = match &columns.colors {
             Colors::Bytes(bytes) => {
                 let above_one = bytes.iter().flatten().any(|&value| value > 1);
-                (false, above_one, false, ColorLook::of(bytes.len(), exact, |i| bytes[i].map(f64::from)))
+                (false, above_one, false, ColorLook::of_bytes(bytes))
             }
             Colors::Floats(floats) => {
                 let whole = |value: &f32| (0.0..=65535.0).contains(value) && value.fract() == 0.0;
@@ -145,9 +145,14 @@ impl Default for Heights {
 
 impl Heights {
     fn of(positions: &[[f32; 3]], up: f64) -> Self {
-        let mut heights = Self::default();
+        let range = |[low, high]: [f32; 2], point: &[f32; 3]| [low.min(point[2]), high.max(point[2])];
+        let [lowest, highest] = positions.iter().fold([f32::INFINITY, f32::NEG_INFINITY], range);
+        let [low, high] = [lowest, highest].map(|height| f64::from(height) + up);
+        if !(low <= NO_HEIGHTS[0]) {
+            return Self { lowest, others: [low, high], ..Self::default() };
+        }
+        let mut heights = Self { lowest, ..Self::default() };
         for point in positions {
-            heights.lowest = heights.lowest.min(point[2]);
             let height = height(point, up);
             let range = if stands_for_none(height) {
                 heights.marked += 1;
