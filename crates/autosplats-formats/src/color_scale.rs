@@ -18,7 +18,7 @@ const CLIPPED: [f64; 3] = [1.01, 256.0, 65536.0];
 const CLIPPED_ONE_IN: usize = 20;
 
 /// How many colour values lie where.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Levels {
     positive: usize,
     /// Values between 0 and 1, which 8-bit values hardly ever are.
@@ -75,7 +75,7 @@ impl Levels {
 }
 
 /// What all colours of a file tell together. Those of its parts can be joined.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ColorLook {
     levels: Levels,
     /// Whether 8 bits lose some value in each scale.
@@ -96,6 +96,17 @@ impl ColorLook {
             look
         };
         (0..count).into_par_iter().fold(Self::default, add).reduce(Self::default, Self::and)
+    }
+
+    /// What colours of whole numbers of 0 to 255 tell.
+    pub(crate) fn of_bytes(colors: &[[u8; 3]]) -> Self {
+        let number = |least: u8| {
+            let of = |color: &[u8; 3]| color.iter().map(|&value| usize::from(value >= least)).sum::<usize>();
+            colors.iter().map(of).sum::<usize>()
+        };
+        let (positive, above_one) = (number(1), number(2));
+        let levels = Levels { positive, fractions: 0, above: [above_one, 0, 0] };
+        Self { levels, lost: [above_one > 0, false, positive > 0] }
     }
 
     #[must_use]
@@ -229,6 +240,17 @@ mod tests {
             assert_eq!(found, full, "{:?} ...", &values[values.len().saturating_sub(3)..]);
             assert_eq!(note.is_some(), clipped > 0, "{note:?}");
             assert!(note.is_none_or(|note| note.starts_with(&format!("{clipped} of "))), "{clipped} are told");
+        }
+    }
+
+    #[test]
+    fn bytes_tell_what_their_values_tell() {
+        for value in 0..=u8::MAX {
+            let colors = [[value; 3], [0, 1, value], [0; 3]];
+            for colors in [&colors[..], &colors[1..], &colors[2..]] {
+                let expected = ColorLook::of(colors.len(), true, |i| colors[i].map(f64::from));
+                assert_eq!(ColorLook::of_bytes(colors), expected, "{colors:?}");
+            }
         }
     }
 

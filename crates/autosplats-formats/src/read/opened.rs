@@ -29,7 +29,8 @@ fn stamp(metadata: &Metadata) -> Stamp {
 }
 
 impl Opened {
-    /// The file without its first bytes, to be read in pieces of about `piece` bytes. It shall stay as `metadata` tells.
+    /// The file without its first bytes, to be read in pieces of about `piece` bytes. It shall stay as `metadata`
+    /// tells.
     pub(super) fn new(path: &Path, metadata: &Metadata, before: usize, piece: usize) -> Self {
         let len = usize::try_from(metadata.len()).unwrap_or(usize::MAX).saturating_sub(before);
         Self { path: path.into(), stamp: stamp(metadata), before, len, piece }

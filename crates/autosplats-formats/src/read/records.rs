@@ -65,8 +65,8 @@ impl Records {
         self.table(&records, count).into_cloud(job, PLACE)
     }
 
-    /// Passes on the records in pieces, in order; an empty one if there are none. Returns their number; the last row of a text does not count if the
-    /// text ends within it.
+    /// Passes on the records in pieces, in order; an empty one if there are none. Returns their number. The last row of
+    /// a text does not count if the text ends within it.
     fn each(&self, job: &Job<'_>, file: &Reader<'_>, part: ProgressRange, take: &mut Take<'_>) -> Result<usize, Error> {
         let most = (file.piece() / self.stride.max(1)).clamp(1, MAX_PIECE);
         let mut records = Vec::new();

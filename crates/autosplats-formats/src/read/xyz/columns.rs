@@ -1,11 +1,9 @@
 //! The values of rows as columns.
 
-use autosplats_cloud::{Error, FieldValues, PointCloud};
-use glam::DVec3;
-use rayon::prelude::*;
+use autosplats_cloud::Error;
 
 use super::super::table::reserve;
-use super::{layout::Layout, settle::Settled};
+use super::layout::Layout;
 
 /// The values of a piece of text, or of all of it.
 pub(super) struct Columns {
@@ -61,30 +59,6 @@ impl Columns {
         }
         Ok(())
     }
-
-    /// Makes the points of these values, about an origin.
-    pub(super) fn into_cloud(self, layout: &Layout, origin: DVec3, settled: &Settled) -> Result<PointCloud, Error> {
-        let mut positions = self.positions;
-        positions.shrink_to_fit();
-        let mut cloud = PointCloud::new(origin, positions);
-        if settled.residuals {
-            cloud = cloud.with_residuals(self.residuals)?;
-        }
-        if layout.has_color {
-            cloud = with_colors(cloud, self.colors, settled)?;
-        }
-        for ((name, _), values) in layout.fields.iter().zip(self.fields) {
-            let values = match values {
-                Values::F32(mut values) => {
-                    values.shrink_to_fit();
-                    FieldValues::F32(values)
-                }
-                Values::F64(values) => FieldValues::F64(values),
-            };
-            cloud = cloud.with_field(name, values)?;
-        }
-        Ok(cloud)
-    }
 }
 
 fn append<T: Copy>(all: &mut Vec<T>, more: &[T], what: &str) -> Result<(), Error> {
@@ -93,41 +67,12 @@ fn append<T: Copy>(all: &mut Vec<T>, more: &[T], what: &str) -> Result<(), Error
     Ok(())
 }
 
-fn floats(bytes: &[[u8; 3]]) -> Result<Vec<[f32; 3]>, Error> {
+/// Colours as floats.
+pub(super) fn floats(bytes: &[[u8; 3]]) -> Result<Vec<[f32; 3]>, Error> {
     let mut floats = Vec::new();
     reserve(&mut floats, bytes.len(), "colours")?;
     floats.extend(bytes.iter().map(|color| color.map(f32::from)));
     Ok(floats)
-}
-
-fn with_colors(cloud: PointCloud, colors: Colors, settled: &Settled) -> Result<PointCloud, Error> {
-    let Some(scale) = settled.scale else {
-        return match colors {
-            Colors::Bytes(bytes) => cloud.with_colors(bytes),
-            Colors::Floats(floats) => cloud.with_colors(floats.iter().map(|color| color.map(|v| v as u8)).collect()),
-        };
-    };
-    let floats = match colors {
-        Colors::Bytes(bytes) => floats(&bytes)?,
-        Colors::Floats(floats) => floats,
-    };
-    let mut bytes = Vec::new();
-    reserve(&mut bytes, floats.len(), "colours")?;
-    bytes.par_extend(floats.par_iter().map(|color| color.map(|value| scale.byte(value.into()))));
-    let mut cloud = cloud.with_colors(bytes)?;
-    let Some(whole) = settled.wide else { return Ok(cloud) };
-    for (channel, name) in ["Red", "Green", "Blue"].into_iter().enumerate() {
-        let values = floats.iter().map(|color| color[channel]);
-        cloud = cloud.with_field(
-            name,
-            if whole {
-                FieldValues::U16(values.map(|value| value as u16).collect())
-            } else {
-                FieldValues::F32(values.collect())
-            },
-        )?;
-    }
-    Ok(cloud)
 }
 
 impl Colors {

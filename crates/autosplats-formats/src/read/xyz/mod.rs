@@ -117,7 +117,7 @@ fn points(job: &Job<'_>, layout: &Layout, preamble: &Preamble) -> Result<PointCl
     look.check(job, &text, preamble.promised)?;
     job.tick(PARSING)?;
     let settled = look.settle(job, layout.has_color, origin, exact);
-    let mut cloud = all.into_cloud(layout, origin, &settled)?.with_crs(crs);
+    let mut cloud = settled.build(all, layout, origin)?.with_crs(crs);
     settled.drop_no_heights(&mut cloud);
     Ok(cloud)
 }
@@ -130,5 +130,5 @@ fn preview(job: &Job<'_>, layout: &Layout, origin: DVec3, pieces: &[Piece]) -> R
         look.add(Look::of(columns, origin, false));
     }
     let settled = look.settle(job, layout.has_color, origin, false);
-    chunk.into_cloud(layout, origin, &settled)
+    settled.build(chunk, layout, origin)
 }

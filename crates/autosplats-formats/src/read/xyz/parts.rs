@@ -82,7 +82,7 @@ impl Pieces for TextPieces {
         let each = parser.each(job, text, rows.start, WHOLE, |pieces| {
             let mut columns = Columns::new(layout);
             pieces.into_iter().try_for_each(|piece| columns.append(&piece.columns))?;
-            let mut cloud = columns.into_cloud(layout, origin, settled)?.with_crs(crs.clone());
+            let mut cloud = settled.build(columns, layout, origin)?.with_crs(crs.clone());
             settled.drop_no_heights(&mut cloud);
             take(cloud, None)
         });

@@ -1,11 +1,15 @@
 //! What all rows of a text tell, and what follows from it for each point. Rows that are read in pieces become the same
 //! points as those that are read at once.
 
-use autosplats_cloud::{Error, PointCloud};
+use autosplats_cloud::{Error, FieldValues, PointCloud};
 use glam::DVec3;
+use rayon::prelude::*;
 
-use super::super::{Job, cuts::Text};
-use super::columns::{Colors, Columns};
+use super::super::{Job, cuts::Text, table::reserve};
+use super::{
+    columns::{Colors, Columns, Values, floats},
+    layout::Layout,
+};
 use crate::color_scale::{ColorLook, ColorScale};
 
 /// Heights that models write where there is none.
@@ -36,7 +40,7 @@ impl Look {
         let (floats, above_one, fractions, colors) = match &columns.colors {
             Colors::Bytes(bytes) => {
                 let above_one = bytes.iter().flatten().any(|&value| value > 1);
-                (false, above_one, false, ColorLook::of(bytes.len(), exact, |i| bytes[i].map(f64::from)))
+                (false, above_one, false, ColorLook::of_bytes(bytes))
             }
             Colors::Floats(floats) => {
                 let whole = |value: &f32| (0.0..=65535.0).contains(value) && value.fract() == 0.0;
@@ -106,6 +110,63 @@ pub(super) struct Settled {
 }
 
 impl Settled {
+    /// Makes the points of these values, which are stored about an origin.
+    pub(super) fn build(&self, columns: Columns, layout: &Layout, origin: DVec3) -> Result<PointCloud, Error> {
+        let mut positions = columns.positions;
+        positions.shrink_to_fit();
+        let mut cloud = PointCloud::new(origin, positions);
+        if self.residuals {
+            cloud = cloud.with_residuals(columns.residuals)?;
+        }
+        if layout.has_color {
+            cloud = self.with_colors(cloud, columns.colors)?;
+        }
+        for ((name, _), values) in layout.fields.iter().zip(columns.fields) {
+            let values = match values {
+                Values::F32(mut values) => {
+                    values.shrink_to_fit();
+                    FieldValues::F32(values)
+                }
+                Values::F64(values) => FieldValues::F64(values),
+            };
+            cloud = cloud.with_field(name, values)?;
+        }
+        Ok(cloud)
+    }
+
+    fn with_colors(&self, cloud: PointCloud, colors: Colors) -> Result<PointCloud, Error> {
+        let Some(scale) = self.scale else {
+            return match colors {
+                Colors::Bytes(bytes) => cloud.with_colors(bytes),
+                // All were bytes when the scale was settled, so the file has changed, which ends reading.
+                Colors::Floats(floats) => {
+                    cloud.with_colors(floats.iter().map(|color| color.map(|v| v as u8)).collect())
+                }
+            };
+        };
+        let floats = match colors {
+            Colors::Bytes(bytes) => floats(&bytes)?,
+            Colors::Floats(floats) => floats,
+        };
+        let mut bytes = Vec::new();
+        reserve(&mut bytes, floats.len(), "colours")?;
+        bytes.par_extend(floats.par_iter().map(|color| color.map(|value| scale.byte(value.into()))));
+        let mut cloud = cloud.with_colors(bytes)?;
+        let Some(whole) = self.wide else { return Ok(cloud) };
+        for (channel, name) in ["Red", "Green", "Blue"].into_iter().enumerate() {
+            let values = floats.iter().map(|color| color[channel]);
+            cloud = cloud.with_field(
+                name,
+                if whole {
+                    FieldValues::U16(values.map(|value| value as u16).collect())
+                } else {
+                    FieldValues::F32(values.collect())
+                },
+            )?;
+        }
+        Ok(cloud)
+    }
+
     /// Drops points whose height stands for none.
     pub(super) fn drop_no_heights(&self, cloud: &mut PointCloud) {
         if self.without_height > 0 {
@@ -145,9 +206,14 @@ impl Default for Heights {
 
 impl Heights {
     fn of(positions: &[[f32; 3]], up: f64) -> Self {
-        let mut heights = Self::default();
+        let range = |[low, high]: [f32; 2], point: &[f32; 3]| [low.min(point[2]), high.max(point[2])];
+        let [lowest, highest] = positions.iter().fold([f32::INFINITY, f32::NEG_INFINITY], range);
+        let [low, high] = [lowest, highest].map(|height| f64::from(height) + up);
+        if !(low <= NO_HEIGHTS[0]) {
+            return Self { lowest, others: [low, high], ..Self::default() };
+        }
+        let mut heights = Self { lowest, ..Self::default() };
         for point in positions {
-            heights.lowest = heights.lowest.min(point[2]);
             let height = height(point, up);
             let range = if stands_for_none(height) {
                 heights.marked += 1;
