@@ -55,7 +55,7 @@ pub use geographic::{LocalMetres, looks_like_degrees};
 /// Vector library of the public interface.
 pub use glam;
 pub use guard::guard;
-pub use memory::{available_memory, check_memory, usual_memory};
+pub use memory::{available_memory, check_memory, own_memory, usual_memory};
 pub use merge::normal_matrix;
 pub use pool::{PointPool, PointRun, SLOT_POINTS, SLOT_SHIFT};
 pub use precision::{

@@ -30,4 +30,6 @@ pub use read::{
     read_mesh_bytes, read_with, table,
 };
 pub use tree::{Part, describe_tree, open_ept_in, open_tree, open_tree_in, read_part};
-pub use write::{Clouds, TreeInput, TreeOptions, TreeSummary, check_writable, write, write_tree, written_formats};
+pub use write::{
+    Clouds, Outline, TreeInput, TreeOptions, TreeSummary, check_writable, write, write_tree, written_formats,
+};

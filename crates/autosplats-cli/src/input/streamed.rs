@@ -6,7 +6,7 @@ use std::path::Path;
 
 use autosplats_cloud::glam::DMat4;
 use autosplats_cloud::{Error, PointCloud, Progress};
-use autosplats_formats::{Clouds, TreeInput};
+use autosplats_formats::{Clouds, Outline, TreeInput};
 use autosplats_scenes::Scene;
 use autosplats_sources::{Input, Source};
 
@@ -68,6 +68,12 @@ struct SceneClouds<'a> {
 impl Clouds for SceneClouds<'_> {
     fn name(&self) -> &Path {
         Path::new(self.name)
+    }
+
+    /// A scene is costly to make, and known beforehand.
+    fn outline(&self, progress: &dyn Progress) -> Result<Option<Outline>, Error> {
+        let some = self.scene.sampler(self.count)?.part(0..self.count.min(Scene::BLOCK), progress)?;
+        Ok(Some(Outline { points: self.count as u64, bounds: self.scene.bounds(), some }))
     }
 
     fn read(

@@ -19,6 +19,6 @@ mod records;
 mod registry;
 mod xyz;
 
-pub use self::copc::{Clouds, TreeInput, TreeOptions, TreeSummary, write_tree};
+pub use self::copc::{Clouds, Outline, TreeInput, TreeOptions, TreeSummary, write_tree};
 use self::job::{Format, Job, note_left_out};
 pub use self::registry::{check_writable, write, written_formats};

@@ -47,7 +47,7 @@ use autosplats_cloud::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-pub use self::sources::{Clouds, TreeInput};
+pub use self::sources::{Clouds, Outline, TreeInput};
 use self::{
     build::build,
     compress::Compressor,

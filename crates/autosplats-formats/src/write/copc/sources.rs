@@ -6,6 +6,7 @@ use std::{
 };
 
 use autosplats_cloud::{Crs, Error, PointCloud, Progress};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
@@ -32,6 +33,14 @@ pub trait Clouds: Sync + Send {
     /// Name of the input.
     fn name(&self) -> &Path;
 
+    /// What all points hold, if that is known beforehand. Otherwise they are read once more to find out.
+    ///
+    /// # Errors
+    /// Those of reading.
+    fn outline(&self, _progress: &dyn Progress) -> Result<Option<Outline>, Error> {
+        Ok(None)
+    }
+
     /// Passes on all points, in clouds that have the same fields. Clouds may come from any thread. Points are asked for
     /// several times, and are the same each time.
     ///
@@ -42,6 +51,18 @@ pub trait Clouds: Sync + Send {
         progress: &dyn Progress,
         take: &(dyn Fn(&PointCloud) -> Result<(), Error> + Sync),
     ) -> Result<(), Error>;
+}
+
+/// What the points of an input hold, known before they are read.
+#[derive(Clone, Debug)]
+pub struct Outline {
+    /// Number of points. Other numbers change no point, but how the work is divided.
+    pub points: u64,
+    /// Corners of a box around all points, in world coordinates. Points outside of it, or a box four times too large,
+    /// have the points read once more.
+    pub bounds: [DVec3; 2],
+    /// Some of the points, with all fields that the others have.
+    pub some: PointCloud,
 }
 
 /// What a tree is made of.
@@ -96,7 +117,11 @@ impl<'a> Source<'a> {
         match self {
             Self::Las(stream) => holds_of(stream, progress),
             Self::Clouds { clouds, survey } => {
-                let (holds, found) = survey_of(&**clouds, progress)?;
+                let found = match clouds.outline(progress)? {
+                    Some(outline) => Some(outlined(&outline)),
+                    None => survey_of(&**clouds, progress)?,
+                };
+                let (holds, found) = holds_of_clouds(clouds.name(), found, progress)?;
                 *lock(survey) = found;
                 Ok(holds)
             }
@@ -185,8 +210,15 @@ fn read_bounds(stream: &Stream, progress: &dyn Progress) -> Result<Bounds, Error
     Ok(bounds.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Reads all points for what they hold.
-fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Option<Survey>), Error> {
+/// What the points hold by their outline.
+fn outlined(Outline { points, bounds, some }: &Outline) -> (Survey, Crs) {
+    let mut survey = Survey::of(some);
+    (survey.points, survey.bounds) = (*points as usize, *bounds);
+    (survey, some.crs().clone())
+}
+
+/// Reads all points for what they hold; `None` if there are none.
+fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<Option<(Survey, Crs)>, Error> {
     let found: Mutex<Option<(Survey, Crs)>> = Mutex::default();
     clouds.read(progress, &|cloud| {
         if cloud.is_empty() {
@@ -200,14 +232,21 @@ fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Opt
         }
         Ok(())
     })?;
-    let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+fn holds_of_clouds(
+    name: &Path,
+    found: Option<(Survey, Crs)>,
+    progress: &dyn Progress,
+) -> Result<(Holds, Option<Survey>), Error> {
     let mut holds = Holds {
-        name: clouds.name().to_owned(),
+        name: name.to_owned(),
         points: 0,
         colors: false,
         infrared: false,
         lattice: None,
-        bounds: [glam::DVec3::ZERO; 2],
+        bounds: [DVec3::ZERO; 2],
         extras: Extras::default(),
         crs: Crs::default(),
         standard_time: None,
@@ -215,11 +254,11 @@ fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Opt
     };
     let Some((survey, crs)) = found else { return Ok((holds, None)) };
     survey.note_losses(progress);
-    let shape = Shape::of(&survey, survey.tree_format(), clouds.name(), &())?;
+    let shape = Shape::of(&survey, survey.tree_format(), name, &())?;
     holds.points = survey.points as u64;
     (holds.colors, holds.infrared) = (survey.colored, shape.format == 8);
     holds.bounds = survey.bounds;
-    holds.lattice = survey.steps.map(|scale| Lattice { scale, offset: glam::DVec3::ZERO });
+    holds.lattice = survey.steps.map(|scale| Lattice { scale, offset: DVec3::ZERO });
     holds.extras = Extras::of(shape.record_len - las::RECORD_LEN[shape.format], &shape.descriptors);
     (holds.crs, holds.standard_time) = (crs, survey.standard_time());
     Ok((holds, Some(survey)))
