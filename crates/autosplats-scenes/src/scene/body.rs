@@ -29,9 +29,8 @@ impl Seam {
 
     #[inline]
     fn min(self, a: f64, b: f64) -> f64 {
-        let least = if b < a { b } else { a };
-        let near = self.radius - (a - b).abs();
-        if near > 0.0 { least - near * near * self.quarter } else { least }
+        let near = (self.radius - (a - b).abs()).max(0.0);
+        a.min(b) - near * near * self.quarter
     }
 
     #[inline]
