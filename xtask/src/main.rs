@@ -10,6 +10,7 @@ mod performance;
 mod pictures;
 mod programs;
 mod test;
+mod walk;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -35,7 +36,10 @@ usage: cargo xtask test               runs every check of CI: rules, lints, docu
        cargo xtask pictures OUT [--program PATH]
                                   a fixed list of pictures, layers and normals in the empty folder OUT, with a hash of each
        cargo xtask pictures --compare BEFORE AFTER
-                                  whether two such folders hold the same";
+                                  whether two such folders hold the same
+       cargo xtask walk FRAMES.jsonl OUT.svg
+                                  a chart of memory, time and points of each frame of a film through an octree, from the
+                                  lines that render --camera-path --json prints";
 
 /// What everything is built with, so that what Zenoh needs is built once, and nothing beside it twice.
 const FEATURES: [&str; 2] = ["--features", "autosplats-cli/zenoh"];
@@ -63,6 +67,7 @@ fn main() -> ExitCode {
             };
             pictures::run(root, &pictures::Task::Render { out: out.as_ref(), program })
         }),
+        ["walk", frames, out] => walk::run(frames.as_ref(), out.as_ref()),
         [] | ["help" | "-h" | "--help"] => {
             println!("{USAGE}");
             Ok(())

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use crate::{Error, PointCloud, Progress};
 
 /// Points that come as clouds, one after another. Whoever works on them needs memory for a cloud, and not for all.
@@ -29,6 +31,14 @@ pub trait Clouds: Sync + Send {
         None
     }
 
+    /// What all points hold, if that is known beforehand. Otherwise they are read once more to find out.
+    ///
+    /// # Errors
+    /// Those of reading.
+    fn outline(&self, _progress: &dyn Progress) -> Result<Option<Outline>, Error> {
+        Ok(None)
+    }
+
     /// All points, if memory holds them anyway.
     fn whole(&self) -> Option<&PointCloud> {
         None
@@ -44,6 +54,18 @@ pub trait Clouds: Sync + Send {
         progress: &dyn Progress,
         take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
     ) -> Result<(), Error>;
+}
+
+/// What the points of an input hold, known before they are read.
+#[derive(Clone, Debug)]
+pub struct Outline {
+    /// Number of points. Other numbers change no point, but how the work is divided.
+    pub points: u64,
+    /// Corners of a box around all points, in world coordinates. Points outside of it, or a box four times too large,
+    /// have the points read once more.
+    pub bounds: [DVec3; 2],
+    /// Some of the points, with all fields that the others have.
+    pub some: PointCloud,
 }
 
 /// A cloud that is in memory.

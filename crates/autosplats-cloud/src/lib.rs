@@ -49,7 +49,7 @@ mod tree;
 pub use axes::Axes;
 pub use classes::class_name;
 pub use cloud::{Field, FieldValues, PointCloud, Scan};
-pub use clouds::{Clouds, Held};
+pub use clouds::{Clouds, Held, Outline};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use encoding::{Unmarked, read_text};
@@ -63,7 +63,7 @@ pub use geographic::{LocalMetres, looks_like_degrees};
 /// Vector library of the public interface.
 pub use glam;
 pub use guard::guard;
-pub use memory::{available_memory, check_memory, usual_memory};
+pub use memory::{available_memory, check_memory, own_memory, usual_memory};
 pub use merge::normal_matrix;
 pub use pool::{PointPool, PointRun, SLOT_POINTS, SLOT_SHIFT};
 pub use precision::{

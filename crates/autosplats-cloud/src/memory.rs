@@ -16,6 +16,16 @@ pub fn available_memory() -> Option<u64> {
     Some(limit.map_or(free, |limit| free.min(limit.saturating_sub(used))))
 }
 
+/// Memory of this process in bytes, now and at most since it began, if the system states it (Linux only).
+pub fn own_memory() -> Option<[u64; 2]> {
+    let status = read_to_string("/proc/self/status").ok()?;
+    let bytes = |name: &str| {
+        let kibibytes = status.lines().find_map(|line| line.strip_prefix(name)?.trim().strip_suffix(" kB"))?;
+        kibibytes.parse::<u64>().ok()?.checked_mul(1024)
+    };
+    Some([bytes("VmRSS:")?, bytes("VmHWM:")?])
+}
+
 /// Bounds of [`usual_memory`].
 const USUAL: [u64; 2] = [256 << 20, 2 << 30];
 
@@ -50,4 +60,20 @@ pub fn check_memory(what: &str, bytes: u64) -> Result<(), Error> {
         return Err(Error::OutOfMemory { what: what.into(), bytes: usize::try_from(bytes).unwrap_or(usize::MAX) });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn own_memory_remembers_its_peak() {
+        let Some([before, _]) = own_memory() else { return };
+        let bytes = vec![1_u8; 100 << 20];
+        let [with, _] = own_memory().expect("as before");
+        assert!(with > before + (90 << 20), "{before} bytes, and {with} with {} more", bytes.len());
+        drop(bytes);
+        let [_, peak] = own_memory().expect("as before");
+        assert!(peak >= with, "{peak} bytes at most, but {with} at once");
+    }
 }

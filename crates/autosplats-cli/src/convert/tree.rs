@@ -58,10 +58,11 @@ pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: &Path, console: &
     drop(bar);
     let bytes = metadata(output).map(|metadata| metadata.len()).map_err(|error| cannot_write(output, &error))?;
     console.tell(format_args!(
-        "{}: {} points in {} nodes, {bytes} bytes",
+        "{}: {} points in {} nodes, {bytes} bytes; {} bytes of disk for temporary records",
         output.display(),
         summary.points,
-        summary.nodes
+        summary.nodes,
+        summary.temporary
     ));
     Ok(())
 }

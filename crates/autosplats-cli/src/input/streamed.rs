@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use autosplats_cloud::glam::DMat4;
-use autosplats_cloud::{Clouds, Error, Part, PointCloud, Progress};
+use autosplats_cloud::{Clouds, Error, Outline, Part, PointCloud, Progress};
 use autosplats_formats::{Parts, TreeInput, describe, open_parts};
 use autosplats_scenes::Scene;
 use autosplats_sources::{Input, Source};
@@ -149,6 +149,12 @@ impl Clouds for SceneClouds<'_> {
 
     fn points(&self) -> Option<u64> {
         Some(self.count as u64)
+    }
+
+    /// A scene is costly to make, and known beforehand.
+    fn outline(&self, progress: &dyn Progress) -> Result<Option<Outline>, Error> {
+        let some = self.scene.sampler(self.count)?.part(0..self.count.min(Scene::BLOCK), progress)?;
+        Ok(Some(Outline { points: self.count as u64, bounds: self.scene.bounds(), some }))
     }
 
     fn read(

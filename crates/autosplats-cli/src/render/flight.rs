@@ -9,7 +9,7 @@ use autosplats_output::Target;
 use super::film::FilmJob;
 use super::job::Job;
 use super::pictures::{FrameReport, FrameTally, QueuedPicture, Writer};
-use super::report::TreeReport;
+use super::report::{MemoryReport, TreeReport};
 use super::{milliseconds_since, scan, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -133,7 +133,9 @@ pub(super) fn run(
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let pictures = matches!(film.target, Target::Film(_)).then_some(1);
             let seconds = frame as f64 / rate;
-            let report = FrameReport { frame, seconds, path: picture, pictures, counts, tree, read_ms, timings_ms };
+            let memory = MemoryReport::now();
+            let report =
+                FrameReport { frame, seconds, path: picture, pictures, counts, tree, memory, read_ms, timings_ms };
             if !writer.put(QueuedPicture { image: writer.picture(&job, &rendered), report }) {
                 // The writer has failed and reports why.
                 return Ok(());

@@ -12,6 +12,7 @@ use super::film::FilmJob;
 use super::job::Job;
 use super::pictures::{FrameReport, FrameTally, QueuedPicture, Writer};
 use super::placement::{MIN_POINTS, SharedPlacement};
+use super::report::MemoryReport;
 use super::{camera, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -87,7 +88,9 @@ pub(super) fn run(
             tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let path = film.file(frame);
-            let report = FrameReport { frame, seconds, path, pictures: None, counts, tree: None, read_ms, timings_ms };
+            let memory = MemoryReport::now();
+            let report =
+                FrameReport { frame, seconds, path, pictures: None, counts, tree: None, memory, read_ms, timings_ms };
             let mut shot = Some(QueuedPicture { image: writer.picture(job, &rendered), report });
             if is_film {
                 std::mem::swap(&mut shot, &mut shown);

@@ -14,6 +14,7 @@ use super::film::FilmJob;
 use super::job::Job;
 use super::pictures::{FrameReport, FrameTally, QueuedPicture, Writer};
 use super::placement::{MIN_POINTS, SharedPlacement};
+use super::report::MemoryReport;
 use super::{camera, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -93,7 +94,9 @@ pub(super) fn run(
             tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let seconds = scene.times[frame] as f64 / 1e9;
-            let report = FrameReport { frame, seconds, path, pictures, counts, tree: None, read_ms, timings_ms };
+            let memory = MemoryReport::now();
+            let report =
+                FrameReport { frame, seconds, path, pictures, counts, tree: None, memory, read_ms, timings_ms };
             if !writer.put(QueuedPicture { image: writer.picture(job, &rendered), report }) {
                 // The writer has failed and reports why.
                 return Ok(());

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::film::FilmJob;
 use super::job::Job;
-use super::report::TreeReport;
+use super::report::{MemoryReport, TreeReport};
 use crate::console::Console;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -56,6 +56,8 @@ pub(super) struct FrameReport {
     /// What was read of octrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) tree: Option<TreeReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) memory: Option<MemoryReport>,
     /// Reading time in milliseconds, including the wait for live input.
     pub(super) read_ms: f64,
     pub(super) timings_ms: Timings,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use autosplats::{Camera, Counts, Frame, PassTime, Timings};
-use autosplats_cloud::Axes;
+use autosplats_cloud::{Axes, own_memory};
 use serde::Serialize;
 
 use super::job::Job;
@@ -24,6 +24,8 @@ pub(super) struct Report<'a> {
     /// What was read of octrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     tree: Option<TreeReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    memory: Option<MemoryReport>,
     timings_ms: PrintedTimings,
     /// Times of the passes of a graphics device.
     passes: Vec<PassTime>,
@@ -38,6 +40,9 @@ pub(super) struct TreeReport {
     pub(super) nodes: usize,
     /// Number of their points.
     pub(super) points: u64,
+    /// Number of nodes that were read for this picture, and of their points. The others were there.
+    pub(super) read_nodes: usize,
+    pub(super) read_points: u64,
     /// Bytes read so far, and in how many requests.
     pub(super) bytes: u64,
     pub(super) requests: u64,
@@ -45,6 +50,21 @@ pub(super) struct TreeReport {
     pub(super) spacing_px: f64,
     /// Milliseconds from the first byte read until all points were there.
     pub(super) complete_ms: f64,
+}
+
+/// Memory of the program in bytes, if the system states it.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct MemoryReport {
+    /// At the end of the picture.
+    resident: u64,
+    /// At most so far.
+    peak: u64,
+}
+
+impl MemoryReport {
+    pub(super) fn now() -> Option<Self> {
+        own_memory().map(|[resident, peak]| Self { resident, peak })
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -82,6 +102,7 @@ impl<'a> Report<'a> {
             camera,
             outputs: written.into_iter().map(|(path, bytes)| Written { path, bytes }).collect(),
             tree: None,
+            memory: MemoryReport::now(),
             timings_ms: PrintedTimings { read, stages: frame.timings, write },
             passes: frame.passes.to_vec(),
         }

@@ -152,6 +152,8 @@ pub(super) fn report(scene: &TreeScene, shown: &Shown, complete_ms: f64) -> Tree
         stored_points: scene.trees().iter().map(|placed| placed.tree.info().points).sum(),
         nodes: shown.nodes,
         points: shown.points,
+        read_nodes: shown.loaded,
+        read_points: shown.loaded_points,
         bytes,
         requests,
         spacing_px: shown.spacing_px,

@@ -7,7 +7,7 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Clouds, Error, FieldValues, Key, PointCloud, PointFilter, Progress, Random,
+    Clouds, Error, FieldValues, Key, Outline, PointCloud, PointFilter, Progress, Random,
     glam::{DMat4, DVec3},
 };
 use autosplats_formats::{ReadOptions, TreeInput, TreeOptions, open_tree, read_with, write, write_tree};
@@ -23,6 +23,32 @@ const MEMORY: u64 = 512 << 20;
 
 fn options(memory: u64) -> TreeOptions {
     TreeOptions { memory, keep_no_returns: true, ..TreeOptions::default() }
+}
+
+/// A cloud whose outline is known, with the number of times it was read.
+struct Outlined {
+    cloud: PointCloud,
+    bounds: [DVec3; 2],
+    reads: AtomicUsize,
+}
+
+impl Clouds for &Outlined {
+    fn name(&self) -> &Path {
+        Path::new("outlined")
+    }
+
+    fn outline(&self, _progress: &dyn Progress) -> Result<Option<Outline>, Error> {
+        Ok(Some(Outline { points: self.cloud.len() as u64, bounds: self.bounds, some: surface(10) }))
+    }
+
+    fn read(
+        &self,
+        _progress: &dyn Progress,
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        self.reads.fetch_add(1, Ordering::Relaxed);
+        take(&self.cloud)
+    }
 }
 
 /// Writes the tree of some LAS files, and returns the notes.
@@ -242,6 +268,34 @@ fn headers_that_lie_about_bounds_do_no_harm() {
         assert_same_points(what, &read(&path), &read(&out));
         let side = open_tree(&out, &()).unwrap().expect("it is COPC").info().cube;
         assert!((side[1] - side[0]).x < 64.0, "{what}: {side:?}");
+    }
+}
+
+#[test]
+fn points_with_an_outline_are_read_once_unless_it_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let (one, other) = (folder.path().join("a.copc.laz"), folder.path().join("b.copc.laz"));
+    // So many that steps are of the same size with each of the bounds.
+    let cloud = surface(400_000);
+    tree_of_cloud(cloud.clone(), &one).unwrap();
+    let (low, high) = (0..cloud.len())
+        .map(|i| cloud.world_position(i))
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+    let cube = |path: &Path| open_tree(path).unwrap().info().cube;
+    for (name, bounds, reads) in [
+        ("exact", [low, high], 1),
+        ("a little wider", [low - 0.5, high + 0.5], 1),
+        ("too narrow", [low, high - DVec3::X], 3),
+        ("four times too wide", [low - 65.0, high + 65.0], 2),
+    ] {
+        let outlined = Outlined { cloud: cloud.clone(), bounds, reads: AtomicUsize::new(0) };
+        let input = TreeInput::Clouds(Box::new(&outlined));
+        write_tree(vec![input], &other, &options(MEMORY), &()).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(outlined.reads.into_inner(), reads, "{name}");
+        assert_same_points(name, &read(&one), &read(&other));
+        let [[low, high], [other_low, other_high]] = [&one, &other].map(|path| cube(path));
+        let same_size = (high - low).abs_diff_eq(other_high - other_low, 1e-9);
+        assert!(same_size, "{name}: {other_low} to {other_high} instead of {low} to {high}");
     }
 }
 

@@ -39,12 +39,12 @@ impl Fold {
         }
     }
 
-    /// Box in the world whose folded image is the cube at `min` with side `size`.
-    pub(super) fn bounds(self, min: DVec3, size: f64) -> (DVec3, DVec3) {
+    /// Box in the world whose folded image is a box, given by its corners.
+    pub(super) fn unfolded(self, low: DVec3, high: DVec3) -> (DVec3, DVec3) {
         match self {
-            Self::None => (min, min + DVec3::splat(size)),
+            Self::None => (low, high),
             Self::Bays { last, .. } => {
-                (DVec3::new(-last - size, -size, min.z), DVec3::new(last + size, size, min.z + size))
+                (DVec3::new(-last - high.x, -high.y, low.z), DVec3::new(last + high.x, high.y, high.z))
             }
         }
     }

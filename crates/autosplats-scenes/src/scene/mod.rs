@@ -236,6 +236,12 @@ impl Scene {
         Some((crossing.distance, tree.rgb(&crossing)))
     }
 
+    /// Corners of a box around the whole surface, in metres. It is larger than the points by less than a tenth, or, where
+    /// these are inside a building, by its walls.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        self.model().tree.bounds()
+    }
+
     /// Visits cubes that together contain the whole surface, from large to small. `visit` gets the centre, half the
     /// side, and whether the cube has no smaller cubes inside, and returns whether to visit those. Returns whether the
     /// scene has such cubes.

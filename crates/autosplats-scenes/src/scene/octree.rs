@@ -1,12 +1,11 @@
-//! Cells of space with the solids that matter in each, and rays through the cells.
+//! Cells of space with the solids that matter in each, and [rays](rays) through the cells.
 //!
 //! # How it works
 //! A cell is empty if its centre is farther from the surface than from its corners. A ray crosses it in one step. Every
 //! other cell is cut into eight, each with the shorter list of solids that matter in it. Cutting ends when the list is
-//! short or the cell is small. There a ray advances by the distance bound until the sign changes. Regula falsi then
-//! refines the root.
+//! short or the cell is small.
 
-use std::ops::Range;
+mod rays;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -50,6 +49,10 @@ pub(super) struct Octree {
     min: DVec3,
     size: f64,
     depth: u32,
+    /// Smallest cells along an edge, per metre, and the size of one.
+    steps: f64,
+    steps_per_metre: f64,
+    unit: f64,
     cells: Vec<Cell>,
     lists: Vec<u16>,
     /// Deepest cell that contains each cube of level [`TABLE_LEVEL`], ordered by z, y, x, and the level of that cell.
@@ -90,19 +93,6 @@ impl Builder<'_> {
     }
 }
 
-/// Intersection of a ray with the surface.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Crossing {
-    pub(super) distance: f64,
-    /// Position before folding.
-    pub(super) world: DVec3,
-    /// Position after folding. `signs` are the signs of the axes after folding.
-    pub(super) folded: DVec3,
-    pub(super) signs: DVec3,
-    first: u32,
-    len: u32,
-}
-
 impl Octree {
     /// Subdivides the cube at `min` with side `size`, which must contain the whole body, down to `size / 2^depth`.
     pub(super) fn new(body: Body, fold: Fold, min: DVec3, size: f64, depth: u32) -> Self {
@@ -133,7 +123,10 @@ impl Octree {
             cells.extend(moved);
             lists.extend(part_lists);
         }
-        let mut tree = Self { body, fold, min, size, depth, cells, lists, top: Vec::new() };
+        let steps = f64::from(1_u32 << depth);
+        let (steps_per_metre, unit) = (steps / size, size / steps);
+        let mut tree =
+            Self { body, fold, min, size, depth, steps, steps_per_metre, unit, cells, lists, top: Vec::new() };
         tree.top = (0..1_u32 << (3 * TABLE_LEVEL))
             .map(|i| tree.descend(i & TABLE_MASK, (i >> TABLE_LEVEL) & TABLE_MASK, i >> (2 * TABLE_LEVEL)))
             .collect();
@@ -173,34 +166,55 @@ impl Octree {
         leaves
     }
 
+    /// Corners of a box in the world around the surface.
+    pub(super) fn bounds(&self) -> [DVec3; 2] {
+        let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let join = |(low, high): (DVec3, DVec3), leaf: &Leaf| (low.min(leaf.min), high.max(leaf.min + leaf.size));
+        let (low, high) = self.leaves().iter().fold(none, join);
+        let (low, high) = self.fold.unfolded(low, high);
+        // Positions are rounded to `f32`.
+        let room = DVec3::splat(1e-5);
+        [low - room, high + room]
+    }
+
     /// The solids that matter in `leaf`.
     pub(super) fn list(&self, leaf: &Leaf) -> &[u16] {
         &self.lists[leaf.first as usize..(leaf.first + leaf.len) as usize]
     }
 
-    /// The cell around the folded position `p`: low corner, size and content.
+    /// Numbers of the smallest cell around the folded position `p`.
     #[inline]
-    fn find(&self, p: DVec3) -> (DVec3, f64, Cell) {
-        let steps = f64::from(1_u32 << self.depth);
-        let q = ((p - self.min) * (steps / self.size)).clamp(DVec3::ZERO, DVec3::splat(steps - 1.0));
-        let (x, y, z) = (q.x as u32, q.y as u32, q.z as u32);
+    fn numbers(&self, p: DVec3) -> [u32; 3] {
+        let q = ((p - self.min) * self.steps_per_metre).clamp(DVec3::ZERO, DVec3::splat(self.steps - 1.0));
+        [q.x as u32, q.y as u32, q.z as u32]
+    }
+
+    /// The cell of the upper levels that contains a smallest cell, and the number of levels below it.
+    #[inline]
+    fn upper(&self, [x, y, z]: [u32; 3]) -> (u32, u32) {
         let shift = self.depth - TABLE_LEVEL;
         let (cell, level) =
             self.top[((((z >> shift) << TABLE_LEVEL | (y >> shift)) << TABLE_LEVEL) | (x >> shift)) as usize];
-        let (mut cell, mut bit) = (cell as usize, self.depth - level);
-        while let Cell::Branch(children) = self.cells[cell] {
+        (cell, self.depth - level)
+    }
+
+    /// The cell that contains a smallest cell: low corner, size and content. Starts at a cell `bit` levels above it.
+    #[inline]
+    fn find(&self, [x, y, z]: [u32; 3], mut cell: Cell, mut bit: u32) -> (DVec3, f64, Cell) {
+        while let Cell::Branch(children) = cell {
             bit -= 1;
-            cell = (children + child_at(x, y, z, bit)) as usize;
+            cell = self.cells[(children + child_at(x, y, z, bit)) as usize];
         }
-        let unit = self.size / steps;
         let corner = DVec3::new(f64::from(x >> bit << bit), f64::from(y >> bit << bit), f64::from(z >> bit << bit));
-        (self.min + corner * unit, unit * f64::from(1_u32 << bit), self.cells[cell])
+        (self.min + corner * self.unit, self.unit * f64::from(1_u32 << bit), cell)
     }
 
     /// Signed distance bound at `p`. In cells without a list, computed from the whole body.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
         let (p, _) = self.fold.apply(p);
-        match self.find(p) {
+        let numbers = self.numbers(p);
+        let (cell, bit) = self.upper(numbers);
+        match self.find(numbers, self.cells[cell as usize], bit) {
             (_, _, Cell::Surface { first, len }) => {
                 self.body.distance(p, &self.lists[first as usize..(first + len) as usize])
             }
@@ -214,37 +228,6 @@ impl Octree {
         self.fold.apply(p).0
     }
 
-    /// Calls `more` with every distance, in increasing order, where the bound changes sign within `to` metres along the
-    /// ray. Stops when `more` returns false. `start` is the bound at the origin. Returns the last crossing and true if
-    /// stopped, or else a bound with the sign at the end, and false.
-    fn crossings(
-        &self,
-        leaf: Leaf,
-        start: f64,
-        origin: DVec3,
-        direction: DVec3,
-        to: f64,
-        more: &mut dyn FnMut(f64) -> bool,
-    ) -> (f64, bool) {
-        let list = self.list(&leaf);
-        // A minimum step keeps grazing rays moving. Only chords shorter than the step are missed.
-        let least = 5e-3 * leaf.size;
-        let (mut t, mut f) = (0.0, start);
-        // A surface farther away than the remaining distance cannot be hit.
-        while f.abs() < to - t {
-            let next = (t + f.abs() + least).min(to);
-            let g = self.body.distance(origin + direction * next, list);
-            if (g < 0.0) != (f < 0.0) {
-                let root = polish(|t| self.body.distance(origin + direction * t, list), (t, f), (next, g));
-                if !more(root) {
-                    return (root, true);
-                }
-            }
-            (t, f) = (next, g);
-        }
-        (f, false)
-    }
-
     /// Bits of the octants of `leaf`, ordered as in [`corner`], that the surface may cross.
     pub(super) fn octants(&self, leaf: &Leaf) -> u8 {
         let quarter = 0.25 * leaf.size;
@@ -253,20 +236,6 @@ impl Octree {
             self.body.distance(middle, self.list(leaf)).abs() <= 1.7321 * quarter
         };
         (0..8).filter(near).fold(0, |bits, i| bits | 1 << i)
-    }
-
-    /// Calls `hit` with the distance of every crossing of the surface and a line through `leaf` from `origin` over `to`
-    /// metres.
-    pub(super) fn crossings_in(&self, leaf: &Leaf, origin: DVec3, direction: DVec3, to: f64, hit: &mut dyn FnMut(f64)) {
-        // Most lines meet nothing, and the bound at their middle shows that at once.
-        let list = self.list(leaf);
-        if self.body.distance(origin + direction * (0.5 * to), list).abs() > 0.5 * to {
-            return;
-        }
-        self.crossings(*leaf, self.body.distance(origin, list), origin, direction, to, &mut |t| {
-            hit(t);
-            true
-        });
     }
 
     /// Visits cubes around the surface; see [`Scene::cubes`](super::Scene::cubes). Returns false in folded space.
@@ -288,68 +257,6 @@ impl Octree {
         self.fold == Fold::None
     }
 
-    /// First crossing of the ray with the surface, from either side. Searches only the distances `within`.
-    pub(super) fn trace(&self, origin: DVec3, direction: DVec3, within: Range<f64>) -> Option<Crossing> {
-        let direction = direction.try_normalize()?;
-        let (low, high) = self.fold.bounds(self.min, self.size);
-        let (start, end) = clip(low, high, origin, direction)?;
-        let (mut t, end) = (start.max(within.start), end.min(within.end));
-        let inverse = direction.recip();
-        let nudge = 1e-10 * self.size;
-        let mut least_step = nudge;
-        t += nudge;
-        let mut was_inside = None;
-        while t < end {
-            let world = origin + direction * t;
-            let (p, signs) = self.fold.apply(world);
-            let along = direction * signs;
-            let (min, size, cell) = self.find(p);
-            let mut to = leave(min, size, p, inverse * signs);
-            match cell {
-                Cell::Surface { first, len } => {
-                    let leaf = Leaf { min, size, first, len };
-                    let crossing = |s: f64| Crossing {
-                        distance: t + s,
-                        world: world + direction * s,
-                        folded: p + along * s,
-                        signs,
-                        first,
-                        len,
-                    };
-                    let start = self.body.distance(p, self.list(&leaf));
-                    let inside = start < 0.0;
-                    if was_inside.is_some_and(|was: bool| was != inside) {
-                        return Some(crossing(0.0));
-                    }
-                    let (value, found) = self.crossings(leaf, start, p, along, to, &mut |_| false);
-                    if found {
-                        return Some(crossing(value));
-                    }
-                    was_inside = Some(value < 0.0);
-                    // Cells nearer than the surface can be skipped.
-                    to = to.max(start.abs());
-                }
-                Cell::Empty(distance) => {
-                    was_inside = Some(distance < 0.0);
-                    // Skips the cell, or the ball around its centre that contains no surface.
-                    let away = (p - min - DVec3::splat(0.5 * size)).length();
-                    to = to.max(distance.abs() - away);
-                }
-                Cell::Branch(_) => unreachable!("find ends at a leaf"),
-            }
-            // A ray in a plane of the fold leaves each cell at once, so steps grow until they lead out of the plane.
-            least_step = if to > nudge { nudge } else { (2.0 * least_step).min(1e-4 * self.size) };
-            t += to + least_step;
-        }
-        None
-    }
-
-    /// Outward unit normal at a crossing.
-    pub(super) fn normal(&self, at: &Crossing) -> DVec3 {
-        let list = &self.lists[at.first as usize..(at.first + at.len) as usize];
-        self.gradient(at.folded, list) * at.signs
-    }
-
     /// Gradient direction of the bound, by central differences.
     pub(super) fn gradient(&self, p: DVec3, list: &[u16]) -> DVec3 {
         const STEP: f64 = 2e-6;
@@ -364,12 +271,6 @@ impl Octree {
         let slope = |axis: DVec3| self.body.distance(p + axis * STEP, list) - here;
         DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize_or(DVec3::Z).abs().element_sum()
     }
-
-    /// Colour at a crossing.
-    pub(super) fn rgb(&self, at: &Crossing) -> [f32; 3] {
-        let list = &self.lists[at.first as usize..(at.first + at.len) as usize];
-        self.body.paint(at.folded, at.world, list).0
-    }
 }
 
 /// Index of a cell among its siblings, from this bit of the coordinates.
@@ -380,47 +281,4 @@ fn child_at(x: u32, y: u32, z: u32, bit: u32) -> u32 {
 
 fn corner(child: usize) -> DVec3 {
     DVec3::new((child & 1) as f64, (child >> 1 & 1) as f64, (child >> 2 & 1) as f64)
-}
-
-/// Distances at which a ray enters and leaves a box; the first is at least zero.
-fn clip(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
-    let inverse = direction.recip();
-    let (a, b) = ((low - origin) * inverse, (high - origin) * inverse);
-    // A ray in the plane of a face makes 0/0 here; `min` and `max` of `f64` then return the other operand.
-    let start = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(0.0);
-    let end = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z));
-    (start < end).then_some((start, end))
-}
-
-/// Distance at which a ray from inside a cube leaves it. `inverse` is the reciprocal of the direction.
-#[inline]
-fn leave(min: DVec3, size: f64, p: DVec3, inverse: DVec3) -> f64 {
-    let p = p - min;
-    let side = |p: f64, inverse: f64| {
-        // For a ray parallel to this side: infinite, or 0/0 in its plane, which `min` below ignores.
-        if inverse > 0.0 { (size - p) * inverse } else { -p * inverse }
-    };
-    f64::INFINITY.min(side(p.x, inverse.x)).min(side(p.y, inverse.y)).min(side(p.z, inverse.z)).max(0.0)
-}
-
-/// Root between two places of opposite sign, by regula falsi with the Illinois rule.
-fn polish(f: impl Fn(f64) -> f64, (mut a, mut fa): (f64, f64), (mut b, mut fb): (f64, f64)) -> f64 {
-    for _ in 0..60 {
-        if fb.abs() < 1e-11 || (b - a).abs() < 1e-12 {
-            break;
-        }
-        let mut t = b - fb * (b - a) / (fb - fa);
-        if !t.is_finite() {
-            t = 0.5 * (a + b);
-        }
-        let ft = f(t);
-        if (ft < 0.0) == (fb < 0.0) {
-            // The same end is kept twice in a row: halve its weight, because convergence would be linear otherwise.
-            fa *= 0.5;
-        } else {
-            (a, fa) = (b, fb);
-        }
-        (b, fb) = (t, ft);
-    }
-    b
 }

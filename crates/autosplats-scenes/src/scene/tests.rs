@@ -137,6 +137,41 @@ fn cells_change_no_hit() {
 }
 
 #[test]
+fn rays_together_meet_what_each_meets_alone() {
+    for scene in all() {
+        // Some rays leave the scene, have no direction or begin outside of it.
+        let mut rays = rays(scene, 500);
+        let mut random = sample::random_of(11);
+        rays.extend((0..200).map(|_| (sphere(&mut random) * FAR * random.unit(), sphere(&mut random))));
+        rays.insert(40, (DVec3::Z, DVec3::ZERO));
+        let tree = &scene.model().tree;
+        let mut together = vec![None; rays.len()];
+        tree.trace_each(&rays, &mut together);
+        let alone = rays.iter().map(|&(origin, direction)| tree.trace(origin, direction, 0.0..f64::INFINITY));
+        let alone: Vec<_> = alone.collect();
+        assert!(alone.iter().any(Option::is_some) && alone.iter().any(Option::is_none), "{}", scene.name());
+        // The texts of numbers are exact.
+        assert_eq!(format!("{together:?}"), format!("{alone:?}"), "{}", scene.name());
+    }
+}
+
+#[test]
+fn all_points_are_within_bounds_that_are_not_much_wider() {
+    for scene in all() {
+        let [low, high] = scene.bounds();
+        let cloud = sample(scene, 100_000);
+        let points = (0..cloud.len()).map(|i| cloud.world_position(i));
+        let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (least, most) = points.fold(none, |(least, most), p| (least.min(p), most.max(p)));
+        let name = scene.name();
+        assert!(low.cmple(least).all() && high.cmpge(most).all(), "{name}: {least} to {most} in {low} to {high}");
+        // A cathedral is scanned from inside; its walls are half a metre to two metres thick.
+        let wider = (high - low - (most - least)).max_element() / (most - least).max_element();
+        assert!(wider < 0.1, "{name}: wider by {wider}: {low} to {high}, points {least} to {most}");
+    }
+}
+
+#[test]
 fn rays_in_a_plane_of_the_fold_arrive() {
     let cathedral = scene("cathedral");
     // Space is folded at x = -6 (half a bay) and at y = 0 (the aisles).

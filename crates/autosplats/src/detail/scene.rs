@@ -47,6 +47,8 @@ pub struct Shown {
     pub spacing_px: f64,
     /// Number of nodes that were not in memory.
     pub loaded: usize,
+    /// Number of their points, as stated by the hierarchy.
+    pub loaded_points: u64,
     /// Number of nodes that cannot be decoded, and of their points.
     pub damaged: [u64; 2],
     /// Why the first of them cannot be decoded.
@@ -173,14 +175,18 @@ impl TreeScene {
         let Choice { nodes, points, spacing_px, .. } = self.choose(camera, size, detail, progress)?;
         // What is there already must not leave to make room.
         let missing = self.pool.choose(&nodes);
-        let mut shown = Shown { nodes: nodes.len(), points, spacing_px, loaded: missing.len(), ..Shown::default() };
+        let (nodes_shown, loaded) = (nodes.len(), missing.len());
+        let mut shown = Shown { nodes: nodes_shown, points, spacing_px, loaded, ..Shown::default() };
         let Self { trees, wanted, pool } = self;
+        let stated = |node: &NodeKey| match trees[node.tree as usize].tree.node(node.key) {
+            Node::Known { points, .. } => u64::from(points),
+            Node::Absent | Node::Unknown => 0,
+        };
+        shown.loaded_points = missing.iter().map(stated).sum();
         load_nodes(trees, &missing, wanted, progress, |NodePoints { node, cloud, damage }| {
             if let Some(damage) = damage {
                 shown.damaged[0] += 1;
-                if let Node::Known { points, .. } = trees[node.tree as usize].tree.node(node.key) {
-                    shown.damaged[1] += u64::from(points);
-                }
+                shown.damaged[1] += stated(&node);
                 shown.damage.get_or_insert(damage);
             }
             let cloud = completed(cloud, pool.sample());

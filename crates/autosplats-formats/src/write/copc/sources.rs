@@ -5,7 +5,8 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use autosplats_cloud::{Clouds, Crs, Error, PointCloud, Progress, lock};
+use autosplats_cloud::{Clouds, Crs, Error, Outline, PointCloud, Progress, lock};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
@@ -70,7 +71,11 @@ impl<'a> Source<'a> {
         match self {
             Self::Las(stream) => holds_of(stream, progress),
             Self::Clouds { clouds, survey } => {
-                let (holds, found) = survey_of(&**clouds, progress)?;
+                let found = match clouds.outline(progress)? {
+                    Some(outline) => Some(outlined(&outline)),
+                    None => survey_of(&**clouds, progress)?,
+                };
+                let (holds, found) = holds_of_clouds(clouds.name(), found, progress)?;
                 *lock(survey) = found;
                 Ok(holds)
             }
@@ -159,8 +164,15 @@ fn read_bounds(stream: &Stream, progress: &dyn Progress) -> Result<Bounds, Error
     Ok(bounds.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Reads all points for what they hold.
-fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Option<Survey>), Error> {
+/// What the points hold by their outline.
+fn outlined(Outline { points, bounds, some }: &Outline) -> Survey {
+    let mut survey = Survey::of(some);
+    (survey.points, survey.bounds) = (*points as usize, *bounds);
+    survey
+}
+
+/// Reads all points for what they hold; `None` if there are none.
+fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<Option<Survey>, Error> {
     let mut found: Option<Survey> = None;
     clouds.read(progress, &mut |cloud| {
         if cloud.is_empty() {
@@ -173,13 +185,21 @@ fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Opt
         }
         Ok(())
     })?;
+    Ok(found)
+}
+
+fn holds_of_clouds(
+    name: &Path,
+    found: Option<Survey>,
+    progress: &dyn Progress,
+) -> Result<(Holds, Option<Survey>), Error> {
     let mut holds = Holds {
-        name: clouds.name().to_owned(),
+        name: name.to_owned(),
         points: 0,
         colors: false,
         infrared: false,
         lattice: None,
-        bounds: [glam::DVec3::ZERO; 2],
+        bounds: [DVec3::ZERO; 2],
         extras: Extras::default(),
         crs: Crs::default(),
         standard_time: None,
@@ -187,11 +207,11 @@ fn survey_of(clouds: &dyn Clouds, progress: &dyn Progress) -> Result<(Holds, Opt
     };
     let Some(survey) = found else { return Ok((holds, None)) };
     survey.note_losses(progress);
-    let shape = Shape::of(&survey, survey.tree_format(), clouds.name(), &())?;
+    let shape = Shape::of(&survey, survey.tree_format(), name, &())?;
     holds.points = survey.points as u64;
     (holds.colors, holds.infrared) = (survey.is_colored(), shape.format == 8);
     holds.bounds = survey.bounds;
-    holds.lattice = survey.steps.map(|scale| Lattice { scale, offset: glam::DVec3::ZERO });
+    holds.lattice = survey.steps.map(|scale| Lattice { scale, offset: DVec3::ZERO });
     holds.extras = Extras::of(shape.record_len - las::RECORD_LEN[shape.format], &shape.descriptors);
     (holds.crs, holds.standard_time) = (survey.crs.clone(), survey.standard_time());
     Ok((holds, Some(survey)))
