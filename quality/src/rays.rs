@@ -1,6 +1,6 @@
 //! The lines of sight of a picture, and the projection onto its pixels.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use autosplats::cloud::glam::DVec3;
 use autosplats::{Camera, Projection};
 
@@ -29,6 +29,7 @@ impl Rays {
         let (perspective, pixel) = match camera.projection {
             Projection::PerspectiveFovDeg(fov) => (true, (0.5 * fov.to_radians()).tan() / (0.5 * height)),
             Projection::OrthographicHeight(world) => (false, world / height),
+            Projection::Pinhole { .. } => bail!("no case has a calibrated camera"),
         };
         Ok(Self { axes, camera: *camera, perspective, pixel, middle: size.map(|side| 0.5 * f64::from(side)) })
     }

@@ -8,8 +8,8 @@ use anyhow::{Result, ensure};
 use crate::run;
 
 /// Says that something was not tested, where nobody overlooks it.
-pub(crate) fn left_out(why: &String) {
-    eprintln!("LEFT OUT: the tests with recordings and messages of other programs: {why}");
+pub(crate) fn left_out(what: &str, why: &str) {
+    eprintln!("LEFT OUT: {what}: {why}");
 }
 
 /// The real scans that some tests read lie beside the repository, as they may not be redistributed. CI has them.

@@ -1,5 +1,6 @@
 //! The project's own tasks. `cargo xtask test` is everything CI runs.
 
+mod environment;
 mod formats;
 mod lanes;
 mod layers;
@@ -9,6 +10,7 @@ mod peers;
 mod performance;
 mod pictures;
 mod programs;
+mod python;
 mod test;
 mod walk;
 
@@ -21,6 +23,8 @@ const USAGE: &str = "\
 usage: cargo xtask test               runs every check of CI: rules, lints, documentation, build, tests
        cargo xtask rules              runs the checks that take seconds: format, imports, lengths, dependencies
        cargo xtask peers              runs the tests with Zenoh and with programs of others; installs their Python packages
+       cargo xtask python             builds and tests the package of Python, and checks its types
+       cargo xtask wheel              builds its wheel for distribution, checks it, and installs it for every Python found
        cargo xtask fuzz [OPTIONS]     gives broken files to every reader; --help lists the options
        cargo xtask quality [OPTIONS]  measures pictures against exact surfaces, in ten minutes, prints what changed since
                                   docs/quality/measures.json, and writes that file and docs/QUALITY.md anew unless an
@@ -50,6 +54,8 @@ fn main() -> ExitCode {
         ["test"] => root().and_then(test::everything),
         ["rules"] => root().and_then(test::rules),
         ["peers"] => root().and_then(peers::alone),
+        ["python"] => root().and_then(python::alone),
+        ["wheel"] => root().and_then(python::wheel),
         ["fuzz", options @ ..] => root().and_then(|root| fuzz(root, options)),
         ["quality", options @ ..] => root().and_then(|root| quality(root, options)),
         ["formats"] => root().and_then(|root| formats::write(root, &formats::build(root)?)),

@@ -1,7 +1,7 @@
 //! `cargo xtask test`: everything that a change has to pass, cheapest first.
 
 use std::cell::RefCell;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::Instant;
 
@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::machine::{component, find_data, find_device, find_screen, left_out};
 use crate::programs::Programs;
-use crate::{FEATURES, cargo, cargo_command, formats, layers, lengths, peers, run};
+use crate::{FEATURES, cargo, cargo_command, formats, layers, lengths, peers, python, run};
 
 /// Steps that report their time, and the time of each for the summary.
 struct Steps {
@@ -42,13 +42,14 @@ impl Steps {
 /// Everything, in one profile and one set of features, so that no crate is built twice for its tests.
 pub(crate) fn everything(root: &Path) -> Result<()> {
     let mut steps = Steps::new();
-    let python = RefCell::new(Err(String::new()));
+    let [peer_python, package_python] = [(); 2].map(|()| RefCell::new(Err(String::new())));
     steps.step("what the machine has", || {
         find_data(root)?;
         find_device()?;
         find_screen()?;
-        *python.borrow_mut() = peers::find_python(root)?;
-        python.borrow().as_ref().err().into_iter().for_each(left_out);
+        *peer_python.borrow_mut() = peers::find_python(root)?;
+        *package_python.borrow_mut() = python::find_python(root)?;
+        tell_left_out(&peer_python.borrow(), &package_python.borrow());
         component("fmt", "rustfmt")?;
         component("clippy", "clippy")
     })?;
@@ -74,12 +75,23 @@ pub(crate) fn everything(root: &Path) -> Result<()> {
         cargo(root, &[&["test", "--locked", "--workspace", "--doc"][..], &FEATURES].concat())
     })?;
     steps.step("docs/FORMATS.md", || formats::check(root, programs.command()?))?;
-    if let Ok(python) = &*python.borrow() {
+    if let Ok(python) = &*peer_python.borrow() {
         steps.step("tests with programs of others", || peers::test(root, python, &["--ignored"]))?;
     }
+    if let Ok(python) = &*package_python.borrow() {
+        steps.step("the package of Python", || python::test(root, python))?;
+    }
     steps.summary();
-    python.borrow().as_ref().err().into_iter().for_each(left_out);
+    tell_left_out(&peer_python.borrow(), &package_python.borrow());
     Ok(())
+}
+
+/// Says what is not tested for want of a Python.
+fn tell_left_out(peers: &Result<PathBuf, String>, package: &Result<PathBuf, String>) {
+    let what = ["the tests with recordings and messages of other programs", "the tests of the package of Python"];
+    for (what, python) in what.into_iter().zip([peers, package]) {
+        python.as_ref().err().into_iter().for_each(|why| left_out(what, why));
+    }
 }
 
 /// What takes seconds.

@@ -167,8 +167,8 @@ impl Findings {
             let state = if *ready { "ready" } else { "not ready" };
             line(*ready, name, format!("{state}: {about}"));
         }
-        for adapter in &self.adapters {
-            line(!adapter.software, "adapter", about_adapter(adapter));
+        for (number, adapter) in self.adapters.iter().enumerate() {
+            line(!adapter.software, "adapter", format!("{number}: {}", about_adapter(adapter)));
         }
         let Cpu { name, threads, simd_found, simd_used, lanes } = &self.cpu;
         line(
@@ -307,18 +307,18 @@ fn about_gpu(adapters: &[AdapterSummary]) -> String {
 
 /// Description of a device's capabilities.
 fn about_adapter(adapter: &AdapterSummary) -> String {
-    let AdapterSummary { name, backend, kind, driver, software, int64_atomics, timestamps, points_per_binding } =
-        adapter;
+    let AdapterSummary { name, pci_bus_id, backend, kind, driver, software, int64_atomics, timestamps, .. } = adapter;
+    let bus = if pci_bus_id.is_empty() { String::new() } else { format!(" at {pci_bus_id}") };
     let passes = if *int64_atomics { "one pass" } else { "two passes: no 64-bit atomics" };
     let timed = match (*software, *timestamps) {
         (true, _) => "passes are timed one by one",
         (_, true) => "passes are timed",
         _ => "passes are not timed",
     };
-    let millions = points_per_binding / 1_000_000;
+    let millions = adapter.points_per_binding / 1_000_000;
     wrapped(
         &format!(
-            "{name} ({kind}, {backend}, {driver}): projection in {passes}; {timed}; clouds are split into runs of \
+            "{name}{bus} ({kind}, {backend}, {driver}): projection in {passes}; {timed}; clouds are split into runs of \
              {millions} million points"
         ),
         INDENT,

@@ -5,12 +5,9 @@ use std::path::Path;
 
 use autosplats::cloud::glam::DVec3;
 use autosplats::{
-    NormalSettings, Normals, NormalsInParts, Orientation, PartsOptions, Viewpoint, estimate_normals,
-    estimate_normals_in_parts,
+    NormalSettings, NormalsInParts, Orientation, PartsOptions, Viewpoint, estimate_normals, estimate_normals_in_parts,
 };
-use autosplats_cloud::{
-    Axes, Clouds, FieldValues, LocalMetres, PointCloud, Progress, Thinned, Thinning, Unit, check_memory,
-};
+use autosplats_cloud::{Axes, Clouds, LocalMetres, PointCloud, Progress, Thinned, Thinning, Unit, check_memory};
 
 use crate::args::NormalsArgs;
 use crate::choices::OrientChoice;
@@ -66,7 +63,7 @@ pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> 
     let (orientation, towards) = orientation(&local, *orient, *sensor)?;
     let normals = estimate_normals(&local, &NormalSettings { k: *k, orientation }, &bar)?;
     drop((bar, local));
-    let cloud = with_normals(cloud, normals)?;
+    let cloud = normals.add_to(cloud)?;
     let bytes = write_cloud(&cloud, &output, console)?;
     let shown = output.display();
     console.tell(format_args!("{shown}: normals of {} points, pointing {towards}; {bytes} bytes", cloud.len()));
@@ -220,20 +217,9 @@ impl Clouds for WithNormals<'_> {
             let end = done + cloud.len() as u64;
             let normals = self.normals.read(done..end)?;
             done = end;
-            take(&with_normals(cloud.clone(), normals)?)
+            take(&normals.add_to(cloud.clone())?)
         })
     }
-}
-
-/// Adds the result as fields, replacing existing ones.
-fn with_normals(cloud: PointCloud, normals: Normals) -> Result<PointCloud, autosplats_cloud::Error> {
-    let Normals { normals, curvature, radius } = normals;
-    let axis = |axis: usize| FieldValues::F32(normals.iter().map(|normal| normal[axis]).collect());
-    let fields = [("NormalX", axis(0)), ("NormalY", axis(1)), ("NormalZ", axis(2))];
-    let fields = fields
-        .into_iter()
-        .chain([("Curvature", FieldValues::F32(curvature)), ("DensityRadius", FieldValues::F32(radius))]);
-    fields.into_iter().try_fold(cloud, |cloud, (name, values)| cloud.with_field(name, values))
 }
 
 /// Orientation of the normals, and its name for the summary.

@@ -8,12 +8,16 @@ use crate::exit::{Exit, Failure};
 
 /// Runs `work` with `count` threads, or one per core.
 ///
-/// The first call in a process sets the pool that all its threads share. A later call for another number has a pool of
-/// its own.
+/// Work without a count that is called in a pool stays there. Else the first call in a process sets the pool that all its
+/// threads share. A later call for another number has a pool of its own.
 pub(crate) fn with_threads(
     count: Option<u16>,
     work: impl FnOnce() -> Result<(), Failure> + Send,
 ) -> Result<(), Failure> {
+    // Within a caller's pool its threads work, and no other pool is started.
+    if count.is_none() && rayon::current_thread_index().is_some() {
+        return work();
+    }
     let there = start_threads(count)?;
     if there || count.is_none_or(|count| usize::from(count) == rayon::current_num_threads()) {
         return work();

@@ -4,26 +4,11 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
-use autosplats::{ColorMode, MAX_SIDE, Reconstruction};
+use autosplats::{MAX_SIDE, Reconstruction};
 use autosplats_cloud::glam::DVec3;
 use autosplats_formats::DepthCamera;
 use autosplats_scenes::parse_count;
 use serde::{Serialize, Serializer};
-
-/// Names of the colour modes. Any other name is a field's.
-pub(crate) const COLOR_MODES: [&str; 11] = [
-    "auto",
-    "rgb",
-    "plain",
-    "height",
-    "intensity",
-    "classification",
-    "normal",
-    "curvature",
-    "radius",
-    "k-radius",
-    "depth",
-];
 
 /// `-k`: number of neighbours that a splat is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -265,25 +250,6 @@ pub(crate) fn ortho(text: &str) -> Result<Ortho, String> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ortho(pub(crate) Option<f64>);
 
-/// Parses one of [`COLOR_MODES`], the name of a field, or `field:NAME` for a field that has the name of a mode.
-pub(crate) fn color(text: &str) -> Result<ColorMode, String> {
-    Ok(match text {
-        "auto" => ColorMode::Auto,
-        "rgb" => ColorMode::Rgb,
-        "plain" => ColorMode::Plain,
-        "height" => ColorMode::Height,
-        "classification" => ColorMode::Classification,
-        "normal" => ColorMode::Normal,
-        "curvature" => ColorMode::Curvature,
-        "radius" => ColorMode::Radius,
-        "k-radius" => ColorMode::KRadius,
-        "depth" => ColorMode::Depth,
-        "" => return Err("must be a colour mode or the name of a field".into()),
-        "intensity" => ColorMode::Field("Intensity".into()),
-        name => ColorMode::Field(name.strip_prefix("field:").unwrap_or(name).into()),
-    })
-}
-
 fn number<T: FromStr + Into<f64> + Copy>(text: &str) -> Option<T> {
     text.trim().parse::<T>().ok().filter(|&value| value.into().is_finite())
 }
@@ -342,15 +308,5 @@ mod tests {
         for bad in ["2..1", "1..1", "1", "nan..2", "..", "0..inf"] {
             assert!(range(bad).is_err(), "{bad} is no range");
         }
-    }
-
-    #[test]
-    fn colors() {
-        for name in COLOR_MODES {
-            let mode = color(name);
-            let is_field = matches!(&mode, Ok(ColorMode::Field(field)) if field != "Intensity");
-            assert!(mode.is_ok() && !is_field, "{name} is a mode");
-        }
-        assert_eq!(color("field:height"), Ok(ColorMode::Field("height".into())), "a field with the name of a mode");
     }
 }

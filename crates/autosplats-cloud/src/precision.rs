@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use crate::FieldValues;
+use crate::{FieldValues, PointCloud};
 
 /// Coordinates below this magnitude need no origin: the `f32` step there is below a millimetre.
 const MAX_WITHOUT_ORIGIN: f64 = 1e4;
@@ -21,6 +21,30 @@ pub fn sample_step(count: usize) -> usize {
 pub fn storage_origin(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
     let middle = sampled_middle(count, world);
     if middle.abs().max_element() < MAX_WITHOUT_ORIGIN { DVec3::ZERO } else { middle }
+}
+
+impl PointCloud {
+    /// Makes a cloud of the points at `world(0)` to `world(count - 1)`, in world coordinates, about their
+    /// [origin](storage_origin). If `exact`, [residuals](Self::residuals) keep what `f32` loses, if it loses anything.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats_cloud::{PointCloud, glam::DVec3};
+    ///
+    /// let survey = [DVec3::new(512_000.123, 5_400_000.456, 310.789), DVec3::new(512_001.0, 5_400_001.0, 311.0)];
+    /// let cloud = PointCloud::from_world(2, |i| survey[i], true);
+    /// assert_eq!([0, 1].map(|i| cloud.world_position(i)), survey);
+    /// ```
+    pub fn from_world(count: usize, world: impl Fn(usize) -> DVec3, exact: bool) -> Self {
+        let origin = storage_origin(count, &world);
+        let about = |i: usize| world(i) - origin;
+        let mut cloud = Self::new(origin, (0..count).map(|i| about(i).as_vec3().to_array()).collect());
+        if exact && (0..count).any(|i| residual(about(i)) != [0.0; 3]) {
+            cloud.residuals = Some((0..count).map(|i| residual(about(i))).collect());
+        }
+        cloud
+    }
 }
 
 /// Parts of a degree to which the origin of points in degrees is rounded; a part is about 11 cm.
@@ -146,4 +170,25 @@ pub fn residual(position: DVec3) -> [f32; 3] {
     let lost = (position - position.as_vec3().as_dvec3()).as_vec3();
     // Infinite and NaN positions have no residual.
     if lost.is_finite() { lost.to_array() } else { [0.0; 3] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clouds_of_world_coordinates_keep_what_is_asked() {
+        let far = |i: usize| DVec3::new(512_000.0, 5_400_000.0, 300.0) + 0.1 * i as f64;
+        for (exact, most) in [(true, 1e-9), (false, 0.01)] {
+            let cloud = PointCloud::from_world(1000, far, exact);
+            assert_eq!(cloud.residuals().is_some(), exact);
+            let worst = (0..1000).map(|i| (cloud.world_position(i) - far(i)).abs().max_element()).fold(0.0, f64::max);
+            assert!(worst <= most, "{worst}");
+        }
+        let near = PointCloud::from_world(3, |i| DVec3::splat(i as f64), true);
+        assert_eq!((near.origin(), near.residuals()), (DVec3::ZERO, None), "nothing is lost");
+        let odd = PointCloud::from_world(2, |i| if i == 0 { DVec3::NAN } else { DVec3::INFINITY }, true);
+        assert!(odd.positions()[0][0].is_nan() && odd.positions()[1][0].is_infinite(), "as they are");
+        assert!(PointCloud::from_world(0, |_| DVec3::ZERO, true).is_empty());
+    }
 }

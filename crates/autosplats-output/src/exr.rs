@@ -20,18 +20,17 @@ use exr::prelude::{Encoding, Image, SpecificChannels, Vec2, WritableImage as _};
 /// Those of the writer, and an unusable camera.
 pub fn write_exr(frame: &Frame<'_>, camera: &Camera, writer: impl Write + Seek) -> Result<()> {
     let Frame { image, layers, .. } = *frame;
-    let [right, down, forward] = camera.axes().map_err(Error::other)?.map(|axis| axis.as_vec3());
+    let lens = camera.lens([image.width, image.height]).map_err(Error::other)?;
     let pixel = |Vec2(x, y): Vec2<usize>| {
         let at = layers.index(x, y);
         if !layers.depth[at].is_finite() {
             return (0.0, 0.0, 0.0, 0.0, f32::INFINITY, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, u32::MAX);
         }
         let [r, g, b] = image.linear[y * image.width as usize + x];
-        let [nx, ny, nz] = layers.normal[at];
-        let normal = right * nx + down * ny + forward * nz;
+        let [nx, ny, nz] = lens.world_normal(layers.normal[at]);
         let (radius, k_radius, curvature) = (layers.radius[at], layers.k_radius[at], layers.curvature[at]);
         let depth = layers.depth[at];
-        (r, g, b, 1.0, depth, normal.x, normal.y, normal.z, radius, k_radius, curvature, layers.point[at])
+        (r, g, b, 1.0, depth, nx, ny, nz, radius, k_radius, curvature, layers.point[at])
     };
     let channels = SpecificChannels::build()
         .with_channel::<f32>("R")

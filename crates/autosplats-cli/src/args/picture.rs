@@ -85,6 +85,9 @@ pub(crate) struct SurfaceArgs {
     /// Device that renders; pictures are the same except for rounding
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) backend: Backend,
+    /// Graphics device that renders, by its number or its place on the PCI bus, as 'autosplats doctor' lists them
+    #[arg(long, value_name = "NUMBER|BUS")]
+    pub(crate) device: Option<String>,
     /// Number of expansions of the search radius, 0 to 8, before a point without neighbours is dropped as an outlier
     #[arg(
         long,
@@ -142,7 +145,7 @@ pub(crate) struct SurfaceArgs {
 pub(crate) struct LookArgs {
     /// auto, rgb, plain, height, intensity, classification, normal, curvature, radius, k-radius, depth, or the name of
     /// a field (field:NAME if a mode has the same name)
-    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = values::color, allow_hyphen_values = true)]
+    #[arg(long, value_name = "MODE", default_value = "auto", allow_hyphen_values = true)]
     pub(crate) color: ColorMode,
     /// Values at both ends of the colour map [default: 1st and 99th percentile of the picture]
     #[arg(long, value_name = "A..B", value_parser = values::range, allow_hyphen_values = true)]

@@ -32,6 +32,12 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Result<(), Failure> {
     let scan = args.scan || options.keep.as_ref().is_some_and(|filter| !filter.is_all());
     let examiner = Examiner::new(options, scan, Room::new(&args.room), console.quiet(several));
 
+    if let [name] = args.inputs.as_slice() {
+        // In this thread, and so in the pool of threads that the caller chose.
+        let mut printed = Printer { console, json: args.json, several, failures: Vec::new() };
+        printed.print(examiner.examine(name))?;
+        return printed.end();
+    }
     let next = AtomicUsize::new(0);
     let (sender, reports) = channel();
     std::thread::scope(|scope| {

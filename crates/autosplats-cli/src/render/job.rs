@@ -20,7 +20,7 @@ use crate::exit::{Exit, Failure, suggest};
 use crate::first_radius::settle_first_radius;
 use crate::input::Inputs;
 use crate::output::{Format, Picture, ReadFiles, check_target};
-use crate::values::{COLOR_MODES, FirstRadius};
+use crate::values::FirstRadius;
 
 /// A picture to render: everything except the points.
 pub(super) struct Job {
@@ -42,6 +42,8 @@ pub(super) struct Job {
     pub(super) path: Option<CameraPath>,
     pub(super) settings: Settings,
     pub(super) backend: Backend,
+    /// A graphics device in place of the backend's own choice.
+    pub(super) device: Option<String>,
     pub(super) first_radius: FirstRadius,
     pub(super) json: bool,
     pub(super) console: Console,
@@ -122,6 +124,9 @@ impl Job {
         }
         check_memory(&format!("a picture of {width}x{height}"), width * height * BYTES_PER_PIXEL)?;
         let (backend, first_radius) = (surface.backend.into(), surface.neighbors.first_radius);
+        if backend == Backend::Cpu && surface.device.is_some() {
+            return Err(Failure::usage("--device: the backend 'cpu' has no devices; leave out one of the two"));
+        }
         let shading = &settings.shading;
         let is_scaled = shading.legend || shading.range.is_some();
         if is_scaled && shading.color.usual_map().is_none() {
@@ -140,6 +145,7 @@ impl Job {
             path,
             settings,
             backend,
+            device: surface.device,
             first_radius,
             json,
             console: console.clone(),
@@ -159,7 +165,7 @@ impl Job {
         cloud: &PointCloud,
         camera: &Camera,
     ) -> Result<(), Failure> {
-        let mut settings = self.settings_for(cloud);
+        let mut settings = self.settings.for_points(cloud);
         let size = self.rendered_size();
         settle_first_radius(&mut settings, self.first_radius, renderer, cloud, camera, size, &self.console)?;
         self.settings.reconstruction.engine = settings.reconstruction.engine;
@@ -174,7 +180,7 @@ impl Job {
         camera: &Camera,
     ) -> Result<Frame<'a>, Failure> {
         let points = points.into();
-        let (size, settings) = (self.rendered_size(), self.settings_for(points));
+        let (size, settings) = (self.rendered_size(), self.settings.for_points(points));
         Ok(renderer.render_while(points, camera, size, &settings, &self.console.goes_on())?)
     }
 
@@ -186,22 +192,10 @@ impl Job {
         camera: &Camera,
     ) -> Result<(), Failure> {
         let points = points.into();
-        let mut settings = self.settings_for(points);
+        let mut settings = self.settings.for_points(points);
         renderer.settle(&mut settings, points, camera, self.rendered_size(), &self.console.goes_on())?;
         self.settings.shading = settings.shading;
         Ok(())
-    }
-
-    /// The settings for any number of points, also none. No point has more neighbours than there are others.
-    fn settings_for<'p>(&self, points: impl Into<Points<'p>>) -> Settings {
-        let points = points.into();
-        let mut settings = self.settings.clone();
-        if points.is_empty() {
-            // An empty cloud has no colours; the picture shows the background.
-            settings.shading.color = ColorMode::Plain;
-        }
-        settings.reconstruction.k = settings.reconstruction.k.min(points.len().saturating_sub(1).max(1) as u32);
-        settings
     }
 
     /// Whether the background is transparent.
@@ -220,7 +214,7 @@ impl Job {
     /// A note if a cloud has too few points for the asked number of neighbours. With `auto`, such clouds are dots.
     pub(super) fn fewer_neighbors(&self, cloud: &PointCloud) -> Option<String> {
         let Reconstruction { k: wanted, adaptive, .. } = self.settings.reconstruction;
-        let k = self.settings_for(cloud).reconstruction.k;
+        let k = self.settings.for_points(cloud).reconstruction.k;
         (k < wanted && !adaptive && !cloud.is_empty())
             .then(|| format!("{} points cannot have {wanted} neighbours each; using {k}", cloud.len()))
     }
@@ -262,8 +256,8 @@ impl Job {
                 "--color {missing}: colour channels are shown together; use --color rgb"
             )));
         }
-        let hint =
-            suggest(missing, COLOR_MODES.into_iter().filter(|mode| *mode != missing.to_lowercase()).chain(fields()));
+        let modes = ColorMode::NAMES.into_iter().filter(|mode| *mode != missing.to_lowercase());
+        let hint = suggest(missing, modes.chain(fields()));
         Err(Failure::usage(format!("--color: the points have no field {missing}; {hint}")))
     }
 }

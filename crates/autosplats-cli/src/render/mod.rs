@@ -34,7 +34,10 @@ use crate::progress::Bar;
 pub(crate) fn run(args: RenderArgs, console: &Console) -> Result<(), Failure> {
     let (mut job, film) = Job::new(args, console)?;
     // A missing device fails before anything is read.
-    let mut renderer = Renderer::with_backend(job.backend)?;
+    let mut renderer = match &job.device {
+        Some(device) => Renderer::with_adapter(device)?,
+        None => Renderer::with_backend(job.backend)?,
+    };
     renderer.check(&job.settings)?;
     let device = Device::of(&renderer);
     if job.path.is_some() {

@@ -31,7 +31,7 @@ impl CameraPath {
             return Ok(None);
         }
         let views = files.iter().map(|file| camera::load(file, console)).collect::<Result<Vec<_>, _>>()?;
-        let is_perspective = |view: &Camera| matches!(view.projection, Projection::PerspectiveFovDeg(_));
+        let is_perspective = |view: &Camera| view.projection.fov_deg().is_some();
         if views.len() < 2 {
             return Err(Failure::usage("--camera-path: one view is no path; name two or more files"));
         }
@@ -52,8 +52,8 @@ impl CameraPath {
         let along = place - first as f64;
         let vector = |of: fn(&Camera) -> DVec3| curve(near.map(of), along);
         let size = |view: &Camera| match view.projection {
-            Projection::PerspectiveFovDeg(fov) => fov,
             Projection::OrthographicHeight(height) => height,
+            perspective => perspective.fov_deg().unwrap_or(Projection::USUAL_FOV_DEG),
         };
         let sizes = near.map(size);
         // A straight line keeps within the bounds of angles and heights.
@@ -63,8 +63,8 @@ impl CameraPath {
             look_at: vector(|view| view.look_at),
             up: vector(|view| view.up.normalize()),
             projection: match near[1].projection {
-                Projection::PerspectiveFovDeg(_) => Projection::PerspectiveFovDeg(between),
                 Projection::OrthographicHeight(_) => Projection::OrthographicHeight(between),
+                _ => Projection::PerspectiveFovDeg(between),
             },
         }
     }

@@ -131,6 +131,16 @@ fn a_gpu_that_is_not_there() {
 }
 
 #[test]
+fn a_device_that_is_not_there() {
+    let folder = Folder::with_sphere();
+    for device in ["99", "0000:ff:1f.7"] {
+        folder.fail(&[&render("sphere.ply")[..], &["--device", device]].concat(), 5, &[device, "no device is called"]);
+    }
+    let both = ["--device", "0", "--backend", "cpu"];
+    folder.fail(&[&render("sphere.ply")[..], &both].concat(), 2, &["--device", "cpu"]);
+}
+
+#[test]
 fn an_engine_that_the_cpu_has_not() {
     let folder = Folder::with_sphere();
     let arguments = ["--engine", "splat-communication", "--backend", "cpu"];

@@ -12,7 +12,7 @@
 /// assert_eq!(crs.name.as_deref(), Some("WGS 84 / UTM zone 32N"));
 /// assert_eq!((crs.epsg, crs.unit), (Some(32_632), Some(Unit::Metre)));
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Crs {
     /// Name for people.
     pub name: Option<String>,
@@ -37,7 +37,7 @@ impl Crs {
 }
 
 /// Keys of a GeoTIFF header with their parameters, as stored in its three tags.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GeoKeys {
     /// The key directory: version, revision, minor revision, number of keys; then four numbers per key. These are its
     /// number, the tag of its value (0: in the directory), the count of values, and the value or the first one's index.
@@ -60,7 +60,7 @@ pub struct CrsDefinition {
 }
 
 /// Unit of a coordinate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Unit {
     /// Metre.
     Metre,

@@ -131,13 +131,13 @@ impl Navigation {
         let world_from_view = DQuat::from_mat3(&DMat3::from_cols(right, down, forward)).normalize();
         let mut distance = camera.eye.distance(camera.look_at);
         match camera.projection {
-            Projection::PerspectiveFovDeg(fov) => {
-                self.fov_deg = fov;
-                self.orthographic = false;
-            }
             Projection::OrthographicHeight(height) => {
                 distance = height / self.height_at_one();
                 self.orthographic = true;
+            }
+            perspective => {
+                self.fov_deg = perspective.fov_deg().unwrap_or(Projection::USUAL_FOV_DEG);
+                self.orthographic = false;
             }
         }
         self.goal = Pose { pivot: camera.look_at, distance, world_from_view };

@@ -131,6 +131,9 @@ impl Camera {
             ViewDirection::Top => (up, -front),
             ViewDirection::Bottom => (-up, front),
         };
+        if let Projection::Pinhole { .. } = projection {
+            return Err(Error::Camera("a calibrated camera has a pose and is not fitted".into()));
+        }
         let own = match projection {
             Projection::PerspectiveFovDeg(fov) if direction == ViewDirection::Auto => Some((axes, fov)),
             _ => None,
@@ -185,8 +188,9 @@ impl Camera {
                 // In front of all points, including trimmed ones that are near.
                 2.0 * extent[2] + *height
             }
-            Projection::PerspectiveFovDeg(fov) => {
-                let slope = 2.0 * half_room * (0.5 * *fov).to_radians().tan();
+            projection => {
+                let fov = projection.fov_deg().unwrap_or(Projection::USUAL_FOV_DEG);
+                let slope = 2.0 * half_room * (0.5 * fov).to_radians().tan();
                 let eye = eye_before(&kept, 0, slope * aspect, rim).min(eye_before(&kept, 1, slope, rim));
                 let least = 0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * MIN_EYE_DISTANCE_EXTENTS;
                 let distance = (middle[2] - eye).max(least);

@@ -2,6 +2,8 @@
 //!
 //! The stages use the crate's own `View` instead, in `f32` about a cloud's origin. A `View` is made from a [`Lens`].
 
+use std::ops::RangeInclusive;
+
 use glam::{DVec2, DVec3};
 
 use super::{Camera, Projection};
@@ -36,11 +38,13 @@ pub struct Lens {
     /// Unit vectors right, down and forward, world coordinates.
     pub(super) axes: [DVec3; 3],
     /// Middle of the picture in pixels.
-    pub(super) middle: DVec2,
-    /// Pixels per unit of x/z (perspective) or of x (orthographic).
+    pub(crate) middle: DVec2,
+    /// Pixels per unit of y/z (perspective) or of y (orthographic).
     pub(super) focal_px: f64,
+    /// Focal length along x over that along y.
+    pub(crate) stretch: f64,
     /// Whether all lines of sight meet in the eye.
-    pub(super) perspective: bool,
+    pub(crate) perspective: bool,
     /// Near plane: points at this depth or nearer are not in the picture.
     pub(crate) near: f64,
 }
@@ -53,9 +57,16 @@ impl Camera {
     pub fn lens(&self, size: [u32; 2]) -> Result<Lens, Error> {
         let axes = self.axes()?;
         let [width, height] = size.map(f64::from);
+        let (mut middle, mut stretch) = (0.5 * DVec2::new(width, height), 1.0);
         let (focal_px, perspective) = match self.projection {
             Projection::PerspectiveFovDeg(fov) if (0.01..=170.0).contains(&fov) => {
                 (0.5 * height / (0.5 * fov.to_radians()).tan(), true)
+            }
+            Projection::Pinhole { focal: [along_x, along_y], center } => {
+                middle = DVec2::from(center) * DVec2::new(width, height);
+                stretch = along_x * width / (along_y * height);
+                check_pinhole([along_x, along_y], center, stretch)?;
+                (along_y * height, true)
             }
             Projection::PerspectiveFovDeg(fov) => {
                 return Err(Error::Camera(format!("field of view {fov} is not within 0.01 to 170 degrees")));
@@ -67,7 +78,7 @@ impl Camera {
         };
         // An orthographic camera drops what is behind the plane of the eye; a perspective one divides by depth.
         let near = if perspective { (self.look_at - self.eye).length() * 1e-5 } else { 0.0 };
-        Ok(Lens { eye: self.eye, axes, middle: 0.5 * DVec2::new(width, height), focal_px, perspective, near })
+        Ok(Lens { eye: self.eye, axes, middle, focal_px, stretch, perspective, near })
     }
 
     /// Pixel coordinates and depth of `world` in a picture of `size` pixels; see [`Lens::to_pixel`].
@@ -87,6 +98,28 @@ impl Camera {
     }
 }
 
+/// Largest part by which the focal lengths of a camera may differ in pixels.
+const MAX_STRETCH: f64 = 0.05;
+/// Focal lengths, as parts of the picture, and parts of it by which the optical axis may miss its middle.
+const FOCAL_LENGTHS: RangeInclusive<f64> = 0.04..=6000.0;
+const MAX_ASIDE: f64 = 10.0;
+
+fn check_pinhole(focal: [f64; 2], center: [f64; 2], stretch: f64) -> Result<(), Error> {
+    if focal.iter().any(|focal| !FOCAL_LENGTHS.contains(focal)) {
+        return Err(Error::Camera(format!(
+            "focal lengths {focal:?} are not within 0.04 to 6000 of the picture's sides"
+        )));
+    }
+    if !((stretch - 1.0).abs() <= MAX_STRETCH) {
+        let what = "focal lengths in pixels may differ by 5 %";
+        return Err(Error::Camera(format!("the one along x is {stretch:.3} times that along y; {what}")));
+    }
+    if center.iter().any(|center| !((center - 0.5).abs() <= MAX_ASIDE)) {
+        return Err(Error::Camera(format!("the optical axis is at {center:?}, far from the picture")));
+    }
+    Ok(())
+}
+
 #[allow(clippy::wrong_self_convention, reason = "the lens maps; it is not converted")]
 impl Lens {
     /// Pixel coordinates and depth of `world`, also beyond the picture's edges; `None` if the point is not in front of
@@ -97,14 +130,15 @@ impl Lens {
         if !(depth > self.near && depth < f64::INFINITY) {
             return None;
         }
-        Some((self.middle + DVec2::new(x, y) / self.pixel_size(depth), depth)).filter(|(pixel, _)| pixel.is_finite())
+        Some((self.middle + DVec2::new(x * self.stretch, y) / self.pixel_size(depth), depth))
+            .filter(|(pixel, _)| pixel.is_finite())
     }
 
     /// World coordinates of the point at `pixel` and `depth`.
     pub fn unproject(&self, pixel: DVec2, depth: f64) -> DVec3 {
         let [right, down, forward] = self.axes;
         let aside = (pixel - self.middle) * self.pixel_size(depth);
-        self.eye + right * aside.x + down * aside.y + forward * depth
+        self.eye + right * (aside.x / self.stretch) + down * aside.y + forward * depth
     }
 
     /// Line of sight through `pixel`: its start and its direction as a unit vector, both in world coordinates.
@@ -116,7 +150,18 @@ impl Lens {
         }
     }
 
-    /// Size of a pixel in world units at `depth`.
+    /// World-space unit vector of a normal of a picture's [surface](crate::GBuffer).
+    #[must_use]
+    pub fn world_normal(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let [right, down, forward] = self.axes.map(|axis| axis.as_vec3());
+        if self.stretch == 1.0 {
+            return (right * x + down * y + forward * z).to_array();
+        }
+        // Normals are perpendicular to what is stretched, so the stretch acts on them in reverse.
+        (right * (x * self.stretch as f32) + down * y + forward * z).normalize_or_zero().to_array()
+    }
+
+    /// Height of a pixel in world units at `depth`.
     pub fn pixel_size(&self, depth: f64) -> f64 {
         if self.perspective { depth / self.focal_px } else { 1.0 / self.focal_px }
     }
@@ -130,8 +175,11 @@ mod tests {
     /// A position where `f32` resolves half metres.
     const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
 
-    fn cameras() -> [Camera; 2] {
-        [Projection::PerspectiveFovDeg(50.0), Projection::OrthographicHeight(8.0)].map(|projection| Camera {
+    /// Lengths of a calibrated camera.
+    const PINHOLE: Projection = Projection::Pinhole { focal: [0.61, 1.07], center: [0.43, 0.56] };
+
+    fn cameras() -> [Camera; 3] {
+        [Projection::PerspectiveFovDeg(50.0), Projection::OrthographicHeight(8.0), PINHOLE].map(|projection| Camera {
             eye: FAR + DVec3::new(3.0, -9.0, 4.0),
             look_at: FAR + DVec3::new(0.25, 0.5, -0.125),
             up: DVec3::new(0.1, 0.0, 2.0),
@@ -194,7 +242,8 @@ mod tests {
                 assert!(way.dot(direction) > 0.0, "and ahead");
             }
             let (middle, depth) = lens.to_pixel(camera.look_at).expect("looked at");
-            assert!(middle.abs_diff_eq(DVec2::new(320.0, 180.0), 1e-6), "in the middle: {middle}");
+            let axis = if camera.projection == PINHOLE { [0.43 * 640.0, 0.56 * 360.0] } else { [320.0, 180.0] };
+            assert!(middle.abs_diff_eq(axis.into(), 1e-6), "on the optical axis: {middle}");
             assert!((depth - camera.look_at.distance(camera.eye)).abs() < 1e-8, "at its distance: {depth}");
         }
     }
@@ -207,6 +256,30 @@ mod tests {
             for place in [behind, camera.eye, DVec3::NAN, DVec3::INFINITY, DVec3::NEG_INFINITY] {
                 assert_eq!(lens.to_pixel(place), None, "{place}");
             }
+        }
+    }
+
+    #[test]
+    fn calibrated_cameras_are_those_of_their_matrix() {
+        // A pinhole in the middle of square pixels is a field of view.
+        let [fov, ..] = cameras();
+        let focal = 0.5 / 25.0_f64.to_radians().tan();
+        let projection = Projection::Pinhole { focal: [focal * 360.0 / 640.0, focal], center: [0.5; 2] };
+        let (lens, pinhole) = (fov.lens(SIZE).expect("a lens"), Camera { projection, ..fov }.lens(SIZE).expect("one"));
+        for place in places() {
+            let [a, b] = [&lens, &pinhole].map(|lens| lens.to_pixel(FAR + place).expect("in front").0);
+            assert!(a.abs_diff_eq(b, 1e-9), "{a} and {b}");
+        }
+        assert!((projection.fov_deg().expect("perspective") - 50.0).abs() < 1e-12);
+        // fx = 500, fy = 510, cx = 300.25, cy = 170.5 by the corner, of a point at (0.3, -0.2, 2) in the camera's axes.
+        let projection =
+            Projection::Pinhole { focal: [500.0 / 640.0, 510.0 / 360.0], center: [300.25 / 640.0, 170.5 / 360.0] };
+        let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Y, up: DVec3::Z, projection };
+        let (pixel, depth) = camera.to_pixel(DVec3::new(0.3, 2.0, 0.2), SIZE).expect("valid").expect("seen");
+        assert!(pixel.abs_diff_eq(DVec2::new(300.25 + 75.0, 170.5 - 51.0), 1e-9) && depth == 2.0, "{pixel}, {depth}");
+        for (focal, center) in [([0.0, 1.0], [0.5; 2]), ([1.0, 1.0], [0.5; 2]), ([0.5625, 1.0], [f64::NAN, 0.5])] {
+            let camera = Camera { projection: Projection::Pinhole { focal, center }, ..camera };
+            assert!(matches!(camera.lens(SIZE), Err(Error::Camera(_))), "{focal:?} {center:?}");
         }
     }
 }

@@ -62,11 +62,30 @@ pub enum Projection {
     PerspectiveFovDeg(f64),
     /// Orthographic, with the height of the picture in world units, above 0.
     OrthographicHeight(f64),
+    /// Perspective of a calibrated camera. The line of sight to [`look_at`](Camera::look_at) is its optical axis, which
+    /// may meet the picture anywhere. Lengths are parts of the picture's width and height.
+    Pinhole {
+        /// Focal lengths along x and y, as parts of width and height, above 0. In pixels they may differ by a
+        /// twentieth: surfaces are reconstructed in a space that is stretched by that.
+        focal: [f64; 2],
+        /// Where the optical axis meets the picture, from the outer corner of its first pixel.
+        center: [f64; 2],
+    },
 }
 
 impl Projection {
     /// Usual vertical field of view of a picture, degrees.
     pub const USUAL_FOV_DEG: f64 = 40.0;
+
+    /// Vertical field of view in degrees, for a picture with its middle on the optical axis; `None` without perspective.
+    #[must_use]
+    pub fn fov_deg(self) -> Option<f64> {
+        match self {
+            Self::PerspectiveFovDeg(fov) => Some(fov),
+            Self::OrthographicHeight(_) => None,
+            Self::Pinhole { focal: [_, focal], .. } => Some(2.0 * (0.5 / focal).atan().to_degrees()),
+        }
+    }
 }
 
 /// A [`Camera`] prepared for one picture of one cloud, with rotation and focal length in `f32`.
@@ -78,8 +97,12 @@ pub(crate) struct View {
     pub(crate) height: u32,
     /// Width in pixels of the margin on every side of the picture.
     pub(crate) margin: u32,
-    /// Rotation from world to view space.
+    /// Rotation from world to view space; then x is multiplied by `stretch`.
     pub(crate) view_from_world: Mat3,
+    /// Focal length along x over that along y. View space is stretched by it, so that pixels are square there.
+    pub(crate) stretch: f32,
+    /// Where the optical axis meets the screen, in pixels.
+    pub(crate) middle: [f32; 2],
     /// Position of the eye, world coordinates.
     pub(crate) eye: DVec3,
     /// Position of the eye relative to the cloud's origin, in world orientation.
@@ -119,17 +142,26 @@ impl Camera {
     /// # Errors
     /// [`Error::Camera`] names what is wrong with its directions or its projection.
     pub fn check(&self) -> Result<(), Error> {
-        self.lens([1, 1]).map(|_| ())
+        // Of what shape pixels are depends on the size of the picture.
+        let size = match self.projection {
+            Projection::Pinhole { focal: [x, y], .. } => [(4096.0 * y / x).clamp(1.0, 1e9) as u32, 4096],
+            _ => [1, 1],
+        };
+        self.lens(size).map(|_| ())
     }
 
     /// Prepares the camera for a picture of `size` pixels, without a margin, of a cloud about `origin`.
     pub(crate) fn view(&self, origin: DVec3, size: [u32; 2]) -> Result<View, Error> {
-        let Lens { axes: [right, down, forward], focal_px, perspective, near, .. } = self.lens(size)?;
+        let Lens { axes: [right, down, forward], focal_px, perspective, near, middle, stretch, .. } =
+            self.lens(size)?;
+        let right = right * stretch;
         Ok(View {
             width: size[0],
             height: size[1],
             margin: 0,
             view_from_world: Mat3::from_cols(right.as_vec3(), down.as_vec3(), forward.as_vec3()).transpose(),
+            stretch: stretch as f32,
+            middle: middle.as_vec2().to_array(),
             eye: self.eye,
             eye_local: (self.eye - origin).as_vec3(),
             focal_px: focal_px as f32,
@@ -149,7 +181,8 @@ impl View {
     /// The same picture with a margin of `margin` pixels on every side.
     pub(crate) fn with_margin(self, margin: u32) -> Self {
         let [width, height] = self.picture_size().map(|side| side + 2 * margin);
-        Self { width, height, margin, ..self }
+        let middle = self.middle.map(|at| at - self.margin as f32 + margin as f32);
+        Self { width, height, margin, middle, ..self }
     }
 
     /// Width and height of the picture in pixels, without the margin.
@@ -176,7 +209,7 @@ impl View {
     #[inline(always)]
     pub(crate) fn to_pixel(&self, position_view: Vec3) -> [f32; 2] {
         let scale = if self.perspective { self.focal_px / position_view.z } else { self.focal_px };
-        [position_view.x * scale + 0.5 * self.width as f32, position_view.y * scale + 0.5 * self.height as f32]
+        [position_view.x * scale + self.middle[0], position_view.y * scale + self.middle[1]]
     }
 
     /// Size of a pixel in world units at `depth`.
@@ -201,6 +234,17 @@ impl View {
     #[inline(always)]
     pub(crate) fn unproject(&self, pixel: [f32; 2], depth: f32) -> Vec3 {
         let scale = self.pixel_size(depth);
-        Vec3::new((pixel[0] - 0.5 * self.width as f32) * scale, (pixel[1] - 0.5 * self.height as f32) * scale, depth)
+        Vec3::new((pixel[0] - self.middle[0]) * scale, (pixel[1] - self.middle[1]) * scale, depth)
+    }
+
+    /// A view-space vector in world axes.
+    #[inline(always)]
+    pub(crate) fn to_world(&self, vector_view: Vec3) -> Vec3 {
+        self.view_from_world.transpose() * (vector_view * Vec3::from(self.unstretched()))
+    }
+
+    /// Factors on a view-space vector before the transposed rotation turns it into world axes.
+    pub(crate) fn unstretched(&self) -> [f32; 3] {
+        [1.0 / (self.stretch * self.stretch), 1.0, 1.0]
     }
 }

@@ -1,6 +1,6 @@
 //! Reprojection: from one frame into an earlier one.
 
-use glam::{DVec3, Mat3, Vec3};
+use glam::{DMat3, DVec3, Mat3, Vec3};
 
 use super::View;
 
@@ -32,7 +32,7 @@ impl Reprojection {
         // In f64: if two clouds are far apart, an eye is far from the other cloud's origin.
         let between = now.view.eye_local.as_dvec3() + (now.origin - past.origin) - past.view.eye_local.as_dvec3();
         Some(Self {
-            rotation: (rotation * now.view.view_from_world.as_dmat3().transpose()).as_mat3(),
+            rotation: (rotation * world_from_view(&now.view)).as_mat3(),
             shift: (rotation * between).as_vec3(),
             view: View { near: now.view.near, ..past.view },
         })
@@ -60,6 +60,11 @@ impl Reprojection {
     pub(crate) fn pixel(&self, position_view: [f32; 3]) -> Option<usize> {
         self.place(position_view.into()).map(|[x, y]| y as usize * self.view.width as usize + x as usize)
     }
+}
+
+fn world_from_view(view: &View) -> DMat3 {
+    let [x, y, z] = view.unstretched().map(f64::from);
+    view.view_from_world.as_dmat3().transpose() * DMat3::from_diagonal(DVec3::new(x, y, z))
 }
 
 #[cfg(test)]

@@ -151,16 +151,28 @@ impl Eye {
         let lens = camera.lens(size)?;
         let [right, down, forward] = camera.axes()?;
         let margin = f64::from(size[0].min(size[1]).div_ceil(PICTURE_SIDE_PER_MARGIN));
-        // Half the screen, as multiples of depth or in world units.
-        let [across, along] = size.map(|side| (0.5 * f64::from(side) + margin) * lens.pixel_size(1.0));
-        let perspective = matches!(camera.projection, Projection::PerspectiveFovDeg(_));
+        // The screen on both sides of the optical axis, as multiples of depth or in world units.
+        let pixel = [lens.pixel_size(1.0) / lens.stretch, lens.pixel_size(1.0)];
+        let sides = |axis: usize| {
+            let middle = lens.middle[axis];
+            [middle + margin, f64::from(size[axis]) - middle + margin].map(|side| side * pixel[axis])
+        };
+        let ([left, right_side], [above, below]) = (sides(0), sides(1));
+        let [across, along] = [left.max(right_side), above.max(below)];
+        let perspective = lens.perspective;
         let side = |axis: DVec3, half: f64| {
             if perspective { (axis + half * forward, 0.0) } else { (axis, -half) }
         };
         Ok(Self {
             lens,
             cube: placed.tree.info().cube,
-            planes: [side(right, across), side(-right, across), side(down, along), side(-down, along), (forward, 0.0)],
+            planes: [
+                side(right, left),
+                side(-right, right_side),
+                side(down, above),
+                side(-down, below),
+                (forward, 0.0),
+            ],
             forward,
             depth_per_distance: (1.0 + across * across + along * along).sqrt().recip(),
         })

@@ -10,6 +10,8 @@ use crate::Error;
 pub struct AdapterSummary {
     /// Name given by the driver.
     pub name: String,
+    /// Place on the PCI bus, such as `0000:3b:00.0`; empty if the driver tells none.
+    pub pci_bus_id: String,
     /// Vulkan, Metal, Dx12 …
     pub backend: String,
     /// DiscreteGpu, IntegratedGpu, Cpu (software) …
@@ -56,6 +58,7 @@ fn summary(info: wgpu::AdapterInfo, features: wgpu::Features, limits: &wgpu::Lim
         software: is_software(&info),
         driver: format!("{} {}", info.driver, info.driver_info).trim().into(),
         name: info.name,
+        pci_bus_id: info.device_pci_bus_id,
         backend: format!("{:?}", info.backend),
         kind: format!("{:?}", info.device_type),
         int64_atomics: features.contains(INT64_ATOMICS),
@@ -92,6 +95,20 @@ fn usable_adapters() -> Vec<wgpu::Adapter> {
     adapters
 }
 
+/// The place in a list of devices that `which` names: the place itself, or that of a device by its PCI bus id, whose
+/// domain of zeros may be left out.
+fn place_of(which: &str, buses: &[&str]) -> Option<usize> {
+    if let Ok(place) = which.trim().parse::<usize>() {
+        return (place < buses.len()).then_some(place);
+    }
+    let bare = |bus: &str| {
+        let small = bus.trim().to_lowercase();
+        small.strip_prefix("00000000:").or(small.strip_prefix("0000:")).map(str::to_owned).unwrap_or(small)
+    };
+    let wanted = bare(which);
+    buses.iter().position(|bus| !bus.is_empty() && bare(bus) == wanted)
+}
+
 impl Gpu {
     /// Opens the best device.
     ///
@@ -115,6 +132,26 @@ impl Gpu {
     pub(crate) fn hardware() -> Result<Option<Self>, Error> {
         let adapter = usable_adapters().into_iter().next();
         adapter.filter(|adapter| !is_software(&adapter.get_info())).map(|adapter| Self::open(&adapter)).transpose()
+    }
+
+    /// The device that `which` names: its index in [`adapters`], or its place on the PCI bus.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if there is no such device, or it does not start.
+    pub(crate) fn named(which: &str) -> Result<Self, Error> {
+        let adapters = usable_adapters();
+        let infos: Vec<wgpu::AdapterInfo> = adapters.iter().map(wgpu::Adapter::get_info).collect();
+        let buses: Vec<&str> = infos.iter().map(|info| &*info.device_pci_bus_id).collect();
+        if let Some(place) = place_of(which, &buses) {
+            return Self::open(&adapters[place]);
+        }
+        let shown = |(place, info): (usize, &wgpu::AdapterInfo)| {
+            let wgpu::AdapterInfo { name, device_pci_bus_id: bus, .. } = info;
+            if bus.is_empty() { format!("{place} ({name})") } else { format!("{place} or {bus} ({name})") }
+        };
+        let known: Vec<String> = infos.iter().enumerate().map(shown).collect();
+        let known = if known.is_empty() { "there is none".into() } else { format!("there are: {}", known.join(", ")) };
+        Err(Error::Device(format!("no device is called '{which}'; {known}")))
     }
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self, Error> {
@@ -195,5 +232,27 @@ pub(crate) fn test_gpu() -> Option<Gpu> {
             eprintln!("nothing checked: {error}");
             None
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_are_named_by_place_and_by_bus() {
+        let buses = ["0000:3b:00.0", "", "0000:af:00.0"];
+        let found =
+            ["0", "2", " 1 ", "0000:AF:00.0", "3b:00.0", "00000000:3B:00.0"].map(|which| place_of(which, &buses));
+        assert_eq!(found, [Some(0), Some(2), Some(1), Some(2), Some(0), Some(0)]);
+        for wrong in ["3", "-1", "", "0000:", "00:00.0", "llvmpipe"] {
+            assert_eq!(place_of(wrong, &buses), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_device_that_is_not_there_is_named() {
+        let Err(Error::Device(message)) = Gpu::named("99") else { panic!("there are no hundred devices") };
+        assert!(message.contains("'99'") && message.contains("there "), "{message}");
     }
 }

@@ -51,6 +51,11 @@ pub(crate) struct FrameUniform {
     pub(crate) compares_density: u32,
     /// 1 if points near the eye are listed.
     pub(crate) near_cells: u32,
+    /// Where the optical axis meets the screen, pixels.
+    pub(crate) middle: [f32; 2],
+    pub(crate) past_middle: [f32; 2],
+    /// Factors on a view-space vector before the transposed rotation turns it into world axes; the fourth is 0.
+    pub(crate) unstretched: [f32; 4],
 }
 
 impl FrameUniform {
@@ -85,13 +90,25 @@ impl FrameUniform {
             scan_lines: 0,
             compares_density: 0,
             near_cells: 0,
+            middle: view.middle,
+            past_middle: view.middle,
+            unstretched: {
+                let [x, y, z] = view.unstretched();
+                [x, y, z, 0.0]
+            },
         }
     }
 
     /// Adds the last frame for reprojection.
     pub(crate) fn after(self, past: &Reprojection) -> Self {
         let Reprojection { rotation, shift, view } = past;
-        Self { past_rotation: columns(*rotation), past_shift: shift.to_array(), past_focal_px: view.focal_px, ..self }
+        Self {
+            past_rotation: columns(*rotation),
+            past_shift: shift.to_array(),
+            past_focal_px: view.focal_px,
+            past_middle: view.middle,
+            ..self
+        }
     }
 }
 

@@ -2,9 +2,39 @@
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
+use autosplats_cloud::{Error, FieldValues, PointCloud};
 use rayon::prelude::*;
 
 use super::Normals;
+
+impl Normals {
+    /// Adds the result to its cloud as fields: `NormalX`, `NormalY`, `NormalZ`, `Curvature` and `DensityRadius`. Fields
+    /// of these names are replaced.
+    ///
+    /// # Errors
+    /// [`Error::AttributeLength`] unless there is one of each per point.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats::{NormalSettings, cloud::{PointCloud, glam::DVec3}, estimate_normals};
+    ///
+    /// let floor = (0..100).map(|i| [(i % 10) as f32, (i / 10) as f32, 0.0]).collect();
+    /// let cloud = PointCloud::new(DVec3::ZERO, floor);
+    /// let cloud = estimate_normals(&cloud, &NormalSettings::default(), &())?.add_to(cloud)?;
+    /// assert!(cloud.field("NormalZ").is_some());
+    /// # Ok::<(), autosplats::Error>(())
+    /// ```
+    pub fn add_to(self, cloud: PointCloud) -> Result<PointCloud, Error> {
+        let Self { normals, curvature, radius } = self;
+        let axis = |axis: usize| FieldValues::F32(normals.iter().map(|normal| normal[axis]).collect());
+        let fields = [("NormalX", axis(0)), ("NormalY", axis(1)), ("NormalZ", axis(2))];
+        let measures = [("Curvature", curvature), ("DensityRadius", radius)];
+        let measures = measures.map(|(name, values)| (name, FieldValues::F32(values)));
+        let mut fields = fields.into_iter().chain(measures);
+        fields.try_fold(cloud, |cloud, (name, values)| cloud.with_field(name, values))
+    }
+}
 
 /// The bits of the result's numbers. Atomic because threads write to interleaved places; each number is written once.
 pub(super) struct Output {

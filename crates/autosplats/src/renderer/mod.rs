@@ -3,6 +3,7 @@
 mod attributes;
 mod checks;
 mod cpu;
+mod devices;
 mod exposure;
 mod first_radius;
 mod frame;
@@ -24,7 +25,7 @@ use self::scaling::Scaling;
 use crate::Error;
 use crate::camera::Camera;
 use crate::fit::GivenPlanes;
-use crate::gpu::{AdapterSummary, Gpu, PassTime};
+use crate::gpu::{Gpu, PassTime};
 use crate::normals::Normals;
 use crate::points::Points;
 use crate::shade::Image;
@@ -217,39 +218,6 @@ impl Renderer {
     /// ```
     pub fn with_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
         Ok(Self::from(BackendRenderer::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?))))
-    }
-
-    /// Creates another renderer in the same place: on the CPU, or on the same device. On a device the two share the
-    /// compute passes compiled so far, so the second one starts sooner. Each keeps its own points and buffers.
-    ///
-    /// # Errors
-    /// [`Error::DeviceMemory`], [`Error::DeviceLost`].
-    ///
-    /// # Examples
-    ///
-    /// ```
-    /// use autosplats::Renderer;
-    ///
-    /// let front = Renderer::new();
-    /// let top = front.another()?;
-    /// assert!(top.adapter().is_none(), "on the CPU, as the first one");
-    /// # Ok::<(), autosplats::Error>(())
-    /// ```
-    pub fn another(&self) -> Result<Self, Error> {
-        match &self.form {
-            BackendRenderer::Cpu(_) => Ok(Self::new()),
-            BackendRenderer::Gpu(renderer) => {
-                Ok(Self::from(BackendRenderer::Gpu(Box::new(GpuRenderer::new(renderer.device().clone())?))))
-            }
-        }
-    }
-
-    /// The device that renders; `None` on the CPU.
-    pub fn adapter(&self) -> Option<AdapterSummary> {
-        match &self.form {
-            BackendRenderer::Cpu(_) => None,
-            BackendRenderer::Gpu(renderer) => Some(renderer.adapter()),
-        }
     }
 
     /// Checks whether this renderer supports `settings`, without a cloud.

@@ -54,7 +54,7 @@ impl Scaling {
         self.known = Some((identity, own));
         let seen = camera.map(|camera| match camera.projection {
             Projection::OrthographicHeight(height) => height,
-            Projection::PerspectiveFovDeg(_) => camera.eye.distance(camera.look_at),
+            _ => camera.eye.distance(camera.look_at),
         });
         self.factor = if seen.is_some_and(|length| computing_scale_of(length) == 1.0) { 1.0 } else { own };
         // Axes are not part of a cloud's identity.
@@ -78,7 +78,7 @@ impl Scaling {
     pub(super) fn camera(&self, camera: &Camera) -> Camera {
         let projection = match camera.projection {
             Projection::OrthographicHeight(height) => Projection::OrthographicHeight(height * self.factor),
-            perspective @ Projection::PerspectiveFovDeg(_) => perspective,
+            perspective => perspective,
         };
         Camera { eye: camera.eye * self.factor, look_at: camera.look_at * self.factor, projection, ..*camera }
     }
@@ -171,7 +171,7 @@ mod tests {
         let cloud = PointCloud::new(DVec3::ZERO, test_clouds::plane(3000)).scaled(unit);
         let projection = match projection {
             Projection::OrthographicHeight(height) => Projection::OrthographicHeight(height * unit),
-            perspective @ Projection::PerspectiveFovDeg(_) => perspective,
+            perspective => perspective,
         };
         let camera = Camera { eye: DVec3::new(0.3, 0.5, 3.0) * unit, look_at: DVec3::ZERO, up: DVec3::Y, projection };
         let mut settings = Settings { all_layers: true, ..Settings::default() };

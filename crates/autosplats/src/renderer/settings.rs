@@ -1,8 +1,9 @@
 //! Settings of a picture, and their ranges.
 
 use crate::Error;
+use crate::points::Points;
 use crate::search::SearchEngine;
-use crate::shade::Shading;
+use crate::shade::{ColorMode, Shading};
 
 /// Settings of a picture: everything except the cloud, the camera and the size.
 ///
@@ -149,6 +150,29 @@ impl Reconstruction {
 }
 
 impl Settings {
+    /// The settings for any number of points, also none: no point has more neighbours than there are others, and no
+    /// points show the background.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use autosplats::{Settings, cloud::PointCloud};
+    ///
+    /// let three = PointCloud::new(Default::default(), vec![[0.0; 3]; 3]);
+    /// assert_eq!(Settings::default().for_points(&three).reconstruction.k, 2);
+    /// ```
+    #[must_use]
+    pub fn for_points<'a>(&self, points: impl Into<Points<'a>>) -> Self {
+        let points = points.into();
+        let mut settings = self.clone();
+        if points.is_empty() {
+            // An empty cloud has no colours.
+            settings.shading.color = ColorMode::Plain;
+        }
+        settings.reconstruction.k = settings.reconstruction.k.min(points.len().saturating_sub(1).max(1) as u32);
+        settings
+    }
+
     /// Checks every value against its range.
     ///
     /// # Errors

@@ -319,7 +319,7 @@ impl<'a> Shader<'a> {
             ColorMode::Height => {
                 let view = self.scene.view;
                 let position = view.unproject([x as f32 + 0.5, y as f32 + 0.5], layers.depth[index]);
-                let local = view.view_from_world.transpose() * position + view.eye_local;
+                let local = view.to_world(position) + view.eye_local;
                 local.as_dvec3().dot(self.scene.up) as f32
             }
             ColorMode::Curvature => layers.curvature[index],

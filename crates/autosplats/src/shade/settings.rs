@@ -1,5 +1,7 @@
 //! Settings of shading.
 
+use std::str::FromStr;
+
 use super::Background;
 
 /// How splats become an image.
@@ -112,7 +114,56 @@ pub enum ColorMode {
     Depth,
 }
 
+/// Parses one of [`NAMES`](ColorMode::NAMES), the name of a field, or `field:NAME` for a field that has the name of a
+/// mode.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats::ColorMode;
+///
+/// assert_eq!("k-radius".parse(), Ok(ColorMode::KRadius));
+/// assert_eq!("GpsTime".parse(), Ok(ColorMode::Field("GpsTime".into())));
+/// assert_eq!("field:height".parse(), Ok(ColorMode::Field("height".into())));
+/// ```
+impl FromStr for ColorMode {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(match text {
+            "auto" => Self::Auto,
+            "rgb" => Self::Rgb,
+            "plain" => Self::Plain,
+            "height" => Self::Height,
+            "classification" => Self::Classification,
+            "normal" => Self::Normal,
+            "curvature" => Self::Curvature,
+            "radius" => Self::Radius,
+            "k-radius" => Self::KRadius,
+            "depth" => Self::Depth,
+            "" => return Err("must be a colour mode or the name of a field".into()),
+            "intensity" => Self::Field("Intensity".into()),
+            name => Self::Field(name.strip_prefix("field:").unwrap_or(name).into()),
+        })
+    }
+}
+
 impl ColorMode {
+    /// Names of the modes, as text is parsed. Any other name is a field's.
+    pub const NAMES: [&str; 11] = [
+        "auto",
+        "rgb",
+        "plain",
+        "height",
+        "intensity",
+        "classification",
+        "normal",
+        "curvature",
+        "radius",
+        "k-radius",
+        "depth",
+    ];
+
     /// The usual colour map of the mode, if it shows a value.
     pub fn usual_map(&self) -> Option<ColorMap> {
         match self {
@@ -172,5 +223,20 @@ impl Default for Shading {
             backs: Backs::default(),
             background: Background::Gradient([0x4a, 0x53, 0x5f], [0x1e, 0x22, 0x28]),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_is_a_mode() {
+        for name in ColorMode::NAMES {
+            let mode: Result<ColorMode, _> = name.parse();
+            let is_field = matches!(&mode, Ok(ColorMode::Field(field)) if field != "Intensity");
+            assert!(mode.is_ok() && !is_field, "{name} is a mode");
+        }
+        assert!("".parse::<ColorMode>().is_err());
     }
 }

@@ -5,7 +5,8 @@ struct Frame {
     view_from_world: mat3x3f,
     // Position of the eye relative to the cloud's origin.
     eye_local: vec3f,
-    // Pixels per unit of x/z (perspective) or of x (orthographic).
+    // Pixels per unit of y/z (perspective) or of y (orthographic). View space is stretched along x to have square
+    // pixels.
     focal_px: f32,
     // Size of the screen in pixels: the picture and the margin around it.
     size: vec2u,
@@ -50,6 +51,11 @@ struct Frame {
     compares_density: u32,
     // 1 if points near the eye are listed.
     near_cells: u32,
+    // Where the optical axis meets the screen, and the last one, in pixels.
+    middle: vec2f,
+    past_middle: vec2f,
+    // Factors on a view-space vector before the transposed rotation turns it into world axes; the fourth is 0.
+    unstretched: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -87,7 +93,7 @@ fn turned_to_view(from_eye: vec3f) -> vec3f {
 
 fn to_pixel(position_view: vec3f) -> vec2f {
     let scale = select(frame.focal_px, frame.focal_px / position_view.z, frame.perspective == 1u);
-    return position_view.xy * scale + 0.5 * vec2f(frame.size);
+    return position_view.xy * scale + frame.middle;
 }
 
 // Size of a pixel in world units at a depth.
@@ -96,5 +102,5 @@ fn pixel_size(depth: f32) -> f32 {
 }
 
 fn unproject(pixel: vec2f, depth: f32) -> vec3f {
-    return vec3f((pixel - 0.5 * vec2f(frame.size)) * pixel_size(depth), depth);
+    return vec3f((pixel - frame.middle) * pixel_size(depth), depth);
 }

@@ -17,7 +17,7 @@ fn past_position(position_view: vec3f) -> vec3f {
 // Pixel coordinates on the last screen of a position in the last frame's view space.
 fn past_place(position: vec3f) -> vec2f {
     let scale = select(frame.past_focal_px, frame.past_focal_px / position.z, frame.perspective == 1u);
-    return position.xy * scale + 0.5 * vec2f(frame.size);
+    return position.xy * scale + frame.past_middle;
 }
 
 // Whether a position with these pixel coordinates was on the last screen; false for NaN.
@@ -40,5 +40,5 @@ fn past_pixel(position: vec3f) -> u32 {
 fn past_unproject(pixel: u32, depth: f32) -> vec3f {
     let at = vec2f(vec2u(pixel % frame.size.x, pixel / frame.size.x)) + 0.5;
     let unit = select(1.0 / frame.past_focal_px, depth / frame.past_focal_px, frame.perspective == 1u);
-    return vec3f((at - 0.5 * vec2f(frame.size)) * unit, depth);
+    return vec3f((at - frame.past_middle) * unit, depth);
 }

@@ -19,6 +19,7 @@ pub(crate) mod gpu;
 mod layers;
 pub(crate) mod over_time;
 mod raster;
+mod rows;
 mod setup;
 #[cfg(test)]
 mod tests;

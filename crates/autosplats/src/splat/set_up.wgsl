@@ -83,8 +83,8 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
             return;
         }
     }
-    let x = extent(c.x, c.z, vec2f(axis_a.x, axis_b.x), across, center_px.x, frame.size.x);
-    let y = extent(c.y, c.z, vec2f(axis_a.y, axis_b.y), across, center_px.y, frame.size.y);
+    let x = extent(c.x, c.z, vec2f(axis_a.x, axis_b.x), across, center_px.x, frame.size.x, frame.middle.x);
+    let y = extent(c.y, c.z, vec2f(axis_a.y, axis_b.y), across, center_px.y, frame.size.y, frame.middle.y);
     let bounds = vec2u(x, y);
     tree[place] = bounds;
     if !is_empty(bounds) && bounds_area(bounds) > MAX_INVOCATION_PX {
@@ -120,7 +120,7 @@ fn front_extent(tangents: vec2f, c: vec2f, a: vec2f, b: vec2f) -> vec2f {
 
 // First and last pixel along an axis whose centre the disc or its dot may cover. `axes` are the coordinates of the
 // disc's axes along that axis, `across` their depths.
-fn extent(c: f32, cz: f32, axes: vec2f, across: vec2f, center_px: f32, size: u32) -> u32 {
+fn extent(c: f32, cz: f32, axes: vec2f, across: vec2f, center_px: f32, size: u32, middle: f32) -> u32 {
     let squared = axes.x * axes.x + axes.y * axes.y;
     var low: f32;
     var high: f32;
@@ -147,7 +147,6 @@ fn extent(c: f32, cz: f32, axes: vec2f, across: vec2f, center_px: f32, size: u32
         low = c - reach;
         high = c + reach;
     }
-    let middle = 0.5 * f32(size);
     low = low * frame.focal_px + middle;
     high = high * frame.focal_px + middle;
     // A centre behind the eye has no dot.

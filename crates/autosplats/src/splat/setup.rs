@@ -161,7 +161,7 @@ fn extent(axis: usize, center: [f32; 3], a: [f32; 3], b: [f32; 3], center_px: f3
         let reach = squared.sqrt();
         (low, high) = (c - reach, c + reach);
     }
-    let middle = 0.5 * size as f32;
+    let middle = view.middle[axis];
     // Pixel i is covered if its centre i + ½ lies within.
     let dot_px = if cz > 0.0 || !view.perspective { DOT_RADIUS_PX } else { f32::NAN };
     let low = (low * view.focal_px + middle).min(center_px - dot_px) - 0.5;

@@ -156,6 +156,7 @@ fn zoomed(camera: &Camera, look_at: DVec3, times: f64) -> Camera {
     let projection = match camera.projection {
         Projection::PerspectiveFovDeg(fov) => Projection::PerspectiveFovDeg(fov / times),
         Projection::OrthographicHeight(height) => Projection::OrthographicHeight(height / times),
+        Projection::Pinhole { focal, center } => Projection::Pinhole { focal: focal.map(|side| side * times), center },
     };
     Camera { look_at, projection, ..*camera }
 }

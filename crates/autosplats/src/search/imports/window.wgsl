@@ -35,7 +35,7 @@ fn window_of_sphere(center: vec3f, radius: f32) -> Window {
         x = tangents(center.x, center.z, radius);
         y = tangents(center.y, center.z, radius);
     }
-    let middle = 0.5 * vec2f(frame.size);
+    let middle = frame.middle;
     let low = floor(vec2f(x.x, y.x) * frame.focal_px + middle - MARGIN_PX);
     let high = floor(vec2f(x.y, y.y) * frame.focal_px + middle + MARGIN_PX);
     let all = picture();

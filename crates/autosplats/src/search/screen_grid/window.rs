@@ -34,10 +34,10 @@ impl Window {
         } else {
             [x0, x1, y0, y1] = [x - radius, x + radius, y - radius, y + radius];
         }
-        x0 = (x0 * view.focal_px + 0.5 * view.width as f32 - MARGIN_PX).floor();
-        x1 = (x1 * view.focal_px + 0.5 * view.width as f32 + MARGIN_PX).floor();
-        y0 = (y0 * view.focal_px + 0.5 * view.height as f32 - MARGIN_PX).floor();
-        y1 = (y1 * view.focal_px + 0.5 * view.height as f32 + MARGIN_PX).floor();
+        x0 = (x0 * view.focal_px + view.middle[0] - MARGIN_PX).floor();
+        x1 = (x1 * view.focal_px + view.middle[0] + MARGIN_PX).floor();
+        y0 = (y0 * view.focal_px + view.middle[1] - MARGIN_PX).floor();
+        y1 = (y1 * view.focal_px + view.middle[1] + MARGIN_PX).floor();
         // A sphere around the plane of the eye projects everywhere.
         let bounded = !view.perspective | (z > 1.0001 * radius);
         Self {

@@ -67,7 +67,7 @@ fn shown_value(pixel: vec2u, index: u32, depth: f32) -> f32 {
     switch SHOWN {
         case SHOW_HEIGHT: {
             let position_view = unproject(vec2f(pixel + frame.margin) + 0.5, depth);
-            return dot(to_world(position_view) + frame.eye_local, shading.up);
+            return dot(to_world(position_view * frame.unstretched.xyz) + frame.eye_local, shading.up);
         }
         case SHOW_RADIUS: {
             return extras[shading.measures + index].x;

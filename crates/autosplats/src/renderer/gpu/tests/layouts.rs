@@ -77,6 +77,9 @@ fn mirrored() -> [Mirrored; 16] {
                 scan_lines,
                 compares_density,
                 near_cells,
+                middle,
+                past_middle,
+                unstretched,
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, slot_shift, slots }),

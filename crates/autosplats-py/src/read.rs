@@ -1,0 +1,110 @@
+//! Files, scenes and other sources to clouds, and clouds to files.
+
+use std::ffi::c_int;
+use std::path::PathBuf;
+
+use autosplats::{Camera, Projection};
+use autosplats_cloud::{Error, PointFilter};
+use autosplats_formats::{ReadOptions, check_writable};
+use autosplats_scenes::View;
+use autosplats_sources::Source;
+use pyo3::exceptions::PyOSError;
+use pyo3::prelude::*;
+
+use crate::cloud::Cloud;
+use crate::errors::Failure;
+use crate::wait::run;
+
+/// Number of the error that a file exists; the same on all systems that Python runs on.
+const EEXIST: c_int = 17;
+
+/// Options of reading, as Python hands them over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Reading {
+    exact: bool,
+    columns: Option<Vec<String>>,
+    keep: Option<String>,
+    keep_no_returns: bool,
+    headers: Vec<String>,
+}
+
+impl Reading {
+    /// The options for the libraries.
+    pub(crate) fn options(self) -> PyResult<ReadOptions> {
+        let Self { exact, columns, keep, keep_no_returns, headers } = self;
+        let keep = keep.map(|words| words.parse::<PointFilter>()).transpose();
+        let keep = keep.map_err(|error| Failure::Cloud(error).raise())?;
+        Ok(ReadOptions { exact, columns, keep, keep_no_returns, headers, ..ReadOptions::default() })
+    }
+}
+
+/// Reads a source by its name: a file, a folder, an address or a scene.
+#[pyfunction]
+pub(crate) fn read_source(
+    py: Python<'_>,
+    name: &str,
+    options: Reading,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Cloud> {
+    let options = options.options()?;
+    let (cloud, camera) = run(py, threads, progress, |watch| {
+        let source = Source::parse(name)?;
+        autosplats_cloud::check_memory("the points of the scene", source.least_bytes())?;
+        let cloud = source.read(&options, watch)?;
+        let camera = match &source {
+            Source::Scene(scene, _) => {
+                let View { eye, look_at, up, fov_degrees } = scene.view();
+                Some(Camera { eye, look_at, up, projection: Projection::PerspectiveFovDeg(fov_degrees) })
+            }
+            _ => None,
+        };
+        Ok((cloud, camera))
+    })?;
+    Ok(Cloud { cloud: cloud.into(), camera })
+}
+
+/// Reads the bytes of a file; its name helps to recognise the format.
+#[pyfunction]
+pub(crate) fn read_bytes(
+    py: Python<'_>,
+    bytes: &[u8],
+    name: PathBuf,
+    options: Reading,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Cloud> {
+    let options = options.options()?;
+    let cloud = run(py, threads, progress, |watch| Ok(autosplats_formats::read_bytes(&name, bytes, &options, watch)?))?;
+    Ok(cloud.into())
+}
+
+/// Writes a cloud in the format of the path's extension. The file appears whole or not at all.
+#[pyfunction]
+pub(crate) fn write(
+    py: Python<'_>,
+    cloud: &Cloud,
+    path: PathBuf,
+    overwrite: bool,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<()> {
+    check_writable(&path).map_err(|error| Failure::Cloud(error).raise())?;
+    check_absent(&path, overwrite)?;
+    run(py, threads, progress, |watch| {
+        autosplats_formats::write(&cloud.cloud, &path, watch).map_err(|error| match error {
+            Error::Io { path, source } => Failure::Io(path, source),
+            error => error.into(),
+        })
+    })
+}
+
+/// Raises FileExistsError if the file exists and must not be overwritten.
+pub(crate) fn check_absent(path: &std::path::Path, overwrite: bool) -> PyResult<()> {
+    if overwrite || !path.exists() {
+        return Ok(());
+    }
+    let what = "the file exists; overwrite=True replaces it";
+    Err(PyOSError::new_err((EEXIST, what, path.display().to_string())))
+}

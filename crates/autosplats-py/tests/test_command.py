@@ -1,0 +1,57 @@
+"""The command, in the process of Python."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import autosplats
+
+
+def run(*arguments: object, **options: object) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "autosplats", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, **options)
+
+
+def test_it_is_the_command(tmp_path):
+    assert run("--version").stdout.split() == ["autosplats", autosplats.__version__]
+    assert run("render", "scene:statue:2K", "-o", tmp_path / "a.png", "--size", "64x48").returncode == 0
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    missing = run("info", tmp_path / "none.ply")
+    assert missing.returncode == 3 and missing.stderr.startswith("error: ") and missing.stderr.count("\n") == 1
+    assert run("nonsense").returncode == 2
+    assert "Usage" in run("--help").stdout or "COMMAND" in run("--help").stdout
+
+
+def test_it_starts_at_once(python):
+    done = python("import sys; sys.argv[1:] = ['--version']; import autosplats.__main__ as m; m.main(); print('numpy' in sys.modules)")
+    assert done.stdout.splitlines()[-1] == "False", "without numpy"
+
+    def least(*command: str) -> float:
+        def once() -> float:
+            start = time.perf_counter()
+            subprocess.run(command, check=True, capture_output=True)
+            return time.perf_counter() - start
+
+        return min(once() for _ in range(5))
+
+    python_alone = least(sys.executable, "-c", "pass")
+    assert least(sys.executable, "-m", "autosplats", "--version") - python_alone < 0.05
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are different there")
+def test_ctrl_c_leaves_nothing(tmp_path):
+    command = [sys.executable, "-m", "autosplats", "convert", "scene:statue:8M", tmp_path / "a.laz"]
+    started = subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True)
+    time.sleep(1.5)
+    started.send_signal(signal.SIGINT)
+    start = time.perf_counter()
+    _, said = started.communicate(timeout=20)
+    assert started.returncode == 130 and "interrupted" in said
+    assert time.perf_counter() - start < 2
+    assert not list(tmp_path.iterdir())
