@@ -189,18 +189,13 @@ impl Octree {
         [q.x as u32, q.y as u32, q.z as u32]
     }
 
-    /// The cell of the upper levels that contains a smallest cell, and the number of levels below it.
+    /// The cell that contains a smallest cell: low corner, size and content.
     #[inline]
-    fn upper(&self, [x, y, z]: [u32; 3]) -> (u32, u32) {
+    fn find(&self, [x, y, z]: [u32; 3]) -> (DVec3, f64, Cell) {
         let shift = self.depth - TABLE_LEVEL;
         let (cell, level) =
             self.top[((((z >> shift) << TABLE_LEVEL | (y >> shift)) << TABLE_LEVEL) | (x >> shift)) as usize];
-        (cell, self.depth - level)
-    }
-
-    /// The cell that contains a smallest cell: low corner, size and content. Starts at a cell `bit` levels above it.
-    #[inline]
-    fn find(&self, [x, y, z]: [u32; 3], mut cell: Cell, mut bit: u32) -> (DVec3, f64, Cell) {
+        let (mut cell, mut bit) = (self.cells[cell as usize], self.depth - level);
         while let Cell::Branch(children) = cell {
             bit -= 1;
             cell = self.cells[(children + child_at(x, y, z, bit)) as usize];
@@ -212,9 +207,7 @@ impl Octree {
     /// Signed distance bound at `p`. In cells without a list, computed from the whole body.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
         let (p, _) = self.fold.apply(p);
-        let numbers = self.numbers(p);
-        let (cell, bit) = self.upper(numbers);
-        match self.find(numbers, self.cells[cell as usize], bit) {
+        match self.find(self.numbers(p)) {
             (_, _, Cell::Surface { first, len }) => {
                 self.body.distance(p, &self.lists[first as usize..(first + len) as usize])
             }

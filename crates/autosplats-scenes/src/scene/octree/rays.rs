@@ -55,8 +55,6 @@ struct Place {
     folded: DVec3,
     signs: DVec3,
     numbers: [u32; 3],
-    upper: u32,
-    bit: u32,
 }
 
 impl Octree {
@@ -80,9 +78,7 @@ impl Octree {
     fn place(&self, ray: &Ray) -> Place {
         let world = ray.origin + ray.direction * ray.t;
         let (folded, signs) = self.fold.apply(world);
-        let numbers = self.numbers(folded);
-        let (upper, bit) = self.upper(numbers);
-        Place { world, folded, signs, numbers, upper, bit }
+        Place { world, folded, signs, numbers: self.numbers(folded) }
     }
 
     /// Takes a ray through one cell. Returns the first crossing in it.
@@ -136,8 +132,7 @@ impl Octree {
         let mut ray = self.enter(origin, direction, within)?;
         while ray.goes_on() {
             let place = self.place(&ray);
-            let cell = self.find(place.numbers, self.cells[place.upper as usize], place.bit);
-            let hit = self.advance(&mut ray, &place, cell);
+            let hit = self.advance(&mut ray, &place, self.find(place.numbers));
             if hit.is_some() {
                 return hit;
             }
@@ -155,18 +150,17 @@ impl Octree {
         let mut waiting = rays.iter().enumerate().filter_map(enter);
         let mut under_way: Vec<(usize, Ray)> = waiting.by_ref().take(RAYS_TOGETHER).collect();
         let mut places = [Place::default(); RAYS_TOGETHER];
-        let mut uppers = [Cell::Empty(0.0); RAYS_TOGETHER];
+        let mut cells = [(DVec3::ZERO, 0.0, Cell::Empty(0.0)); RAYS_TOGETHER];
         while !under_way.is_empty() {
             for ((_, ray), place) in under_way.iter().zip(&mut places) {
                 *place = self.place(ray);
             }
-            for (place, cell) in places[..under_way.len()].iter().zip(&mut uppers) {
-                *cell = self.cells[place.upper as usize];
+            for (place, cell) in places[..under_way.len()].iter().zip(&mut cells) {
+                *cell = self.find(place.numbers);
             }
             for i in (0..under_way.len()).rev() {
                 let (number, ray) = &mut under_way[i];
-                let cell = self.find(places[i].numbers, uppers[i], places[i].bit);
-                let hit = self.advance(ray, &places[i], cell);
+                let hit = self.advance(ray, &places[i], cells[i]);
                 if hit.is_some() || !ray.goes_on() {
                     hits[*number] = hit;
                     match waiting.next() {
