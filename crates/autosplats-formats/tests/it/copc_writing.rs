@@ -281,11 +281,12 @@ fn points_with_an_outline_are_read_once_unless_it_is_wrong() {
     let (low, high) = (0..cloud.len())
         .map(|i| cloud.world_position(i))
         .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
-    let cube = |path: &Path| open_tree(path).unwrap().info().cube;
+    let cube = |path: &Path| open_tree(path, &()).unwrap().expect("it is COPC").info().cube;
     for (name, bounds, reads) in [
         ("exact", [low, high], 1),
         ("a little wider", [low - 0.5, high + 0.5], 1),
-        ("too narrow", [low, high - DVec3::X], 3),
+        ("too narrow, but not beyond the cube", [low, high - DVec3::X], 1),
+        ("too narrow", [low + DVec3::X, high], 3),
         ("four times too wide", [low - 65.0, high + 65.0], 2),
     ] {
         let outlined = Outlined { cloud: cloud.clone(), bounds, reads: AtomicUsize::new(0) };
