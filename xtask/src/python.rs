@@ -22,8 +22,9 @@ const WHEEL_PACKAGES: &str = "crates/autosplats-py/requirements-wheel.txt";
 const WHEEL_FOLDER: &str = "wheel-python";
 /// Largest wheel, in bytes.
 const MAX_WHEEL: u64 = 8_000_000;
-/// Libraries that the wheel may need of a Linux system.
-const NEEDED: [&str; 4] = ["libc.so.6", "libm.so.6", "libgcc_s.so.1", "ld-linux-x86-64.so.2"];
+/// Libraries that the wheel may need of a Linux system: those of its C library, and the compiler's.
+const NEEDED: [&str; 6] =
+    ["libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "libgcc_s.so.1", "ld-linux-x86-64.so.2"];
 /// Pythons that the wheel is installed for.
 const PYTHONS: [&str; 6] = ["3.10", "3.11", "3.12", "3.13", "3.14", "3.15"];
 /// What an empty environment does with it.

@@ -8,8 +8,8 @@ use crate::exit::{Exit, Failure};
 
 /// Runs `work` with `count` threads, or one per core.
 ///
-/// Work without a count that is called in a pool stays there. Else the first call in a process sets the pool that all its
-/// threads share. A later call for another number has a pool of its own.
+/// Work without a count that is called in a pool stays there. Else the first call in a process sets the pool that all
+/// its threads share. A later call for another number has a pool of its own.
 pub(crate) fn with_threads(
     count: Option<u16>,
     work: impl FnOnce() -> Result<(), Failure> + Send,

@@ -77,7 +77,7 @@ impl Projection {
     /// Usual vertical field of view of a picture, degrees.
     pub const USUAL_FOV_DEG: f64 = 40.0;
 
-    /// Vertical field of view in degrees, for a picture with its middle on the optical axis; `None` without perspective.
+    /// Vertical field of view in degrees, for a picture about the optical axis; `None` without perspective.
     #[must_use]
     pub fn fov_deg(self) -> Option<f64> {
         match self {
