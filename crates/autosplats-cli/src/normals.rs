@@ -14,7 +14,7 @@ use crate::choices::OrientChoice;
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
-use crate::output::{check_cloud_target, write_cloud, write_parts};
+use crate::output::{check_cloud_target, write_cloud};
 use crate::parts::{Need, Parts, WorkError, check_room, parts};
 use crate::progress::Bar;
 
@@ -86,7 +86,7 @@ fn in_parts(args: &NormalsArgs, parts: &Parts, output: &Path, console: &Console)
     let normals = estimate_normals_in_parts(&local, &settings, &options, &bar).map_err(|error| failed(error.into()))?;
     drop((writing, bar));
     let (points, tiles, in_doubt) = (normals.len(), normals.tiles(), normals.in_doubt());
-    let bytes = write_parts(&WithNormals { clouds: &thinned, normals }, output, parts, console)?;
+    let bytes = parts.write(&WithNormals { clouds: &thinned, normals }, output, console)?;
     if in_doubt > 0 {
         console.note(format_args!(
             "{in_doubt} points may have nearer neighbours than the memory held at once; allow more with --memory"

@@ -5,14 +5,13 @@ use std::fs::{File, create_dir_all, metadata};
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use autosplats_cloud::{Clouds, Error, PointCloud, temporary_beside, write_whole};
-use autosplats_formats::{check_writable, write_clouds};
+use autosplats_cloud::{Error, PointCloud, temporary_beside, write_whole};
+use autosplats_formats::check_writable;
 use autosplats_output::PictureFormat;
 
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
-use crate::parts::Parts;
 use crate::progress::Bar;
 
 /// Files that are read. No output may replace one.
@@ -84,14 +83,6 @@ pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, console: &Console) ->
         Err(Error::Io { source, .. }) => Err(cannot_write(path, &source)),
         Err(error) => Err(Failure::new(Exit::Output, error)),
     }
-}
-
-/// Like [`write_cloud`], of points that memory does not hold.
-pub(crate) fn write_parts(clouds: &dyn Clouds, path: &Path, parts: &Parts, console: &Console) -> Result<u64, Failure> {
-    let bar = Bar::on_file("writing", path, console);
-    let _writing = console.interrupt().writing();
-    write_clouds(clouds, path, &bar).map_err(|error| parts.failure(error, path))?;
-    metadata(path).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error))
 }
 
 /// Fails if the cloud's output has an unknown format, exists without `force`, or cannot be written.

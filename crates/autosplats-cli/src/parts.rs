@@ -1,8 +1,10 @@
 //! Work on more points than memory holds, in parts.
 
+use std::fs::metadata;
 use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Clouds, Error, Part, Progress as _, Spool, available_memory, check_disk, usual_memory};
+use autosplats_formats::write_clouds;
 
 use crate::args::{PartArgs, RoomArgs};
 use crate::console::Console;
@@ -101,6 +103,14 @@ pub(crate) fn parts(
 }
 
 impl Parts {
+    /// Writes the points, of which this work made `clouds`. Returns the size of the file in bytes.
+    pub(crate) fn write(&self, clouds: &dyn Clouds, output: &Path, console: &Console) -> Result<u64, Failure> {
+        let bar = Bar::on_file("writing", output, console);
+        let _writing = console.interrupt().writing();
+        write_clouds(clouds, output, &bar).map_err(|error| self.failure(error, output))?;
+        metadata(output).map(|metadata| metadata.len()).map_err(|error| cannot_write(output, &error))
+    }
+
     /// The failure of an error in the work.
     pub(crate) fn failure(&self, error: impl Into<WorkError>, output: &Path) -> Failure {
         match error.into() {

@@ -10,7 +10,7 @@ use crate::args::{ConvertArgs, ThinningArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
-use crate::output::{check_cloud_target, write_cloud, write_parts};
+use crate::output::{check_cloud_target, write_cloud};
 use crate::parts::{Need, Parts, check_room, parts};
 use crate::progress::Bar;
 
@@ -74,7 +74,7 @@ fn in_parts(args: &ConvertArgs, parts: &Parts, output: &Path, console: &Console)
     let thinned = Thinned::new(&parts.clouds, thinning, &parts.folder, parts.memory, &bar);
     let thinned = thinned.map_err(|error| parts.failure(error, output))?;
     drop((bar, _writing));
-    let bytes = write_parts(&thinned, output, parts, console)?;
+    let bytes = parts.write(&thinned, output, console)?;
     tell(output, thinned.kept(), parts.points, bytes, console);
     Ok(())
 }

@@ -7,6 +7,7 @@ mod room;
 mod spacing;
 mod statistics;
 mod text;
+mod values;
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -91,3 +91,12 @@ impl Facts {
         self.wide.is_some_and(|wide| wide.are_colors())
     }
 }
+
+/// Notes that `format` cannot hold the sensors, the coordinate system and `others`, as far as the points have them.
+pub(super) fn note_left_out(job: &Job<'_>, facts: &Facts, format: &str, others: &[(bool, &str)]) {
+    let all = [(facts.scans, "the poses of the sensors"), (facts.system, "the coordinate system")];
+    let losses: Vec<&str> = all.iter().chain(others).filter(|(lost, _)| *lost).map(|(_, what)| *what).collect();
+    if !losses.is_empty() {
+        job.note(format!("{format} does not hold {}", losses.join(", ")));
+    }
+}

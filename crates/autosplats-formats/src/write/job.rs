@@ -4,8 +4,6 @@ use std::{fs::File, io::BufWriter, path::Path};
 
 use autosplats_cloud::{Clouds, Error, PointCloud, Progress, one_line};
 
-use super::facts::Facts;
-
 /// A file format that can be written.
 pub(super) struct Format {
     /// Name in messages and tables.
@@ -63,14 +61,5 @@ impl Job<'_> {
             let what = format!("{format} is written from memory, which does not hold all points; write .laz or .ply");
             Error::unsupported(self.path, what)
         })
-    }
-}
-
-/// Notes that `format` cannot hold the sensors, the coordinate system and `others`, as far as the points have them.
-pub(super) fn note_left_out(job: &Job<'_>, facts: &Facts, format: &str, others: &[(bool, &str)]) {
-    let all = [(facts.scans, "the poses of the sensors"), (facts.system, "the coordinate system")];
-    let losses: Vec<&str> = all.iter().chain(others).filter(|(lost, _)| *lost).map(|(_, what)| *what).collect();
-    if !losses.is_empty() {
-        job.note(format!("{format} does not hold {}", losses.join(", ")));
     }
 }

@@ -21,5 +21,5 @@ mod registry;
 mod xyz;
 
 pub use self::copc::{TreeInput, TreeOptions, TreeSummary, write_tree};
-use self::job::{Format, Job, note_left_out};
+use self::job::{Format, Job};
 pub use self::registry::{check_writable, write, write_clouds, written_formats};

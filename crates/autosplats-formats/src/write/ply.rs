@@ -11,8 +11,7 @@ use autosplats_cloud::{Error, Field, FieldValues, PointCloud, each_type};
 use super::{
     Format, Job,
     colors::{CHANNELS, channels},
-    facts::Facts,
-    note_left_out,
+    facts::{Facts, note_left_out},
     records::Records,
 };
 

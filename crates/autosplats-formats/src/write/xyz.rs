@@ -16,9 +16,8 @@ use super::{
     Format, Job,
     colors::{CHANNELS, channels},
     decimal,
-    facts::Facts,
+    facts::{Facts, note_left_out},
     names::unique_names,
-    note_left_out,
 };
 
 pub(super) const FORMAT: Format = Format { name: "text", extensions: &["xyz", "txt", "csv", "asc", "pts"], write };
