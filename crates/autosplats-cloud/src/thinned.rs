@@ -49,8 +49,8 @@ pub struct Thinned<'a> {
 }
 
 impl<'a> Thinned<'a> {
-    /// Prepares the work. For cubes all points are read once; their positions wait in a file without a name in `folder`,
-    /// and `memory` bytes are used.
+    /// Prepares the work. For cubes all points are read once; their positions wait in a file without a name in
+    /// `folder`, and `memory` bytes are used.
     ///
     /// # Errors
     /// Those of reading and of the operating system; [`Error::BadValue`] for sizes that cannot be; and

@@ -190,7 +190,8 @@ fn step_of(points: u64, sample: u64) -> u64 {
 /// # Examples
 ///
 /// ```
-/// assert_eq!(autosplats_cloud::sampled_median(3, |i| [[0.0, 5.0, 1.0], [1.0, 4.0, 9.0], [2.0, 6.0, 2.0]][i]), [1.0, 5.0, 2.0]);
+/// let points = [[0.0, 5.0, 1.0], [1.0, 4.0, 9.0], [2.0, 6.0, 2.0]];
+/// assert_eq!(autosplats_cloud::sampled_median(3, |i| points[i]), [1.0, 5.0, 2.0]);
 /// ```
 pub fn sampled_median(points: usize, position: impl Fn(usize) -> [f32; 3]) -> [f32; 3] {
     let step = step_of(points as u64, MEDIAN_SAMPLE) as usize;

@@ -67,8 +67,8 @@ struct Chosen {
 /// origin and with the same attributes. Opening reads all points one to four times, because much is decided by all of
 /// them. Notes are given then.
 ///
-/// `None` for a file that has to be read whole: of a format other than LAS, PLY, PCD, text and E57; with triangles, or lists
-/// beside the coordinates; compressed; in UTF-16; and what is no file, such as a pipe. Nothing is noted of it.
+/// `None` for a file that has to be read whole: of a format other than LAS, PLY, PCD, text and E57; with triangles, or
+/// lists beside the coordinates; compressed; in UTF-16; and what is no file, such as a pipe. Nothing is noted of it.
 ///
 /// # Errors
 /// Those of [`read_with`](crate::read_with); and [`Error::Malformed`] if the file changes meanwhile.

@@ -236,8 +236,8 @@ impl Scene {
         Some((crossing.distance, tree.rgb(&crossing)))
     }
 
-    /// Corners of a box around the whole surface, in metres. It is larger than the points by less than a tenth, or, where
-    /// these are inside a building, by its walls.
+    /// Corners of a box around the whole surface, in metres. It is larger than the points by less than a tenth, or,
+    /// where these are inside a building, by its walls.
     pub fn bounds(&self) -> [DVec3; 2] {
         self.model().tree.bounds()
     }

@@ -1,9 +1,10 @@
 //! Normals of more points than memory holds, tile by tile.
 //!
 //! # How it works
-//! The points are divided into [`Tiles`]. Each is loaded with a halo and estimated like a cloud. A neighbourhood is exact
-//! if it ends where all points are known. The distance to the k-th neighbour among some of the points is never less than
-//! among all, so a halo of that width is enough for a second attempt. Results wait in a file, in the input's order.
+//! The points are divided into [`Tiles`]. Each is loaded with a halo and estimated like a cloud. A neighbourhood is
+//! exact if it ends where all points are known. The distance to the k-th neighbour among some of the points is never
+//! less than among all, so a halo of that width is enough for a second attempt. Results wait in a file, in the input's
+//! order.
 //!
 //! The sums over a neighbourhood run in another order than for the whole cloud, so their last bits differ.
 
