@@ -41,7 +41,7 @@ pub enum TreeInput<'a> {
 /// An open input.
 pub(super) enum Source<'a> {
     Las(Box<Stream>),
-    Clouds { clouds: Box<dyn Clouds + 'a>, survey: Mutex<Option<Survey>> },
+    Clouds { clouds: Box<dyn Clouds + 'a>, survey: Box<Mutex<Option<Survey>>> },
 }
 
 /// A source with what makes its records those of the tree.
@@ -62,7 +62,7 @@ impl<'a> Source<'a> {
                 Some(stream) => Ok(Self::Las(Box::new(stream))),
                 None => Err(Error::malformed(&path, "byte 0", "a LAS file begins with 'LASF'; this one does not")),
             },
-            TreeInput::Clouds(clouds) => Ok(Self::Clouds { clouds, survey: Mutex::default() }),
+            TreeInput::Clouds(clouds) => Ok(Self::Clouds { clouds, survey: Box::default() }),
         }
     }
 
