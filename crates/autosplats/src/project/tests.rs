@@ -37,6 +37,7 @@ fn place(camera: &Camera, size: [u32; 2], position: [f32; 3]) -> Place {
             (1e-5 * (camera.look_at - camera.eye).length(), focal_px / view.z)
         }
         Projection::OrthographicHeight(world) => (0.0, height / world),
+        Projection::Pinhole { .. } => unreachable!("not among these cameras"),
     };
     if !view.is_finite() {
         Place::NotFinite
@@ -73,6 +74,7 @@ fn unit(camera: &Camera, [_, height]: [u32; 2], depth: f64) -> f64 {
     match camera.projection {
         Projection::PerspectiveFovDeg(fov) => 2.0 * (0.5 * fov.to_radians()).tan() * depth / f64::from(height),
         Projection::OrthographicHeight(world) => world / f64::from(height),
+        Projection::Pinhole { .. } => unreachable!("not among these cameras"),
     }
 }
 

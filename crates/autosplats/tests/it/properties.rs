@@ -96,6 +96,7 @@ fn without_ties(positions: &[[f32; 3]], camera: &Camera) -> Positions {
         let scale = match camera.projection {
             Projection::PerspectiveFovDeg(fov) => 0.5 / (0.5 * fov.to_radians()).tan() / depth,
             Projection::OrthographicHeight(height) => 1.0 / height,
+            Projection::Pinhole { .. } => unreachable!("not among these cameras"),
         };
         // Squares of about a pixel, independent of the pixels' borders: a square and those around it contain the pixel.
         let square = [x, y].map(|c| (c * scale * f64::from(SIZE[1])).floor() as i64);
@@ -189,7 +190,7 @@ fn units_do_not_matter() {
                 let scaled: Positions = positions.iter().map(|p| p.map(|c| (f64::from(c) * unit) as f32)).collect();
                 let projection = match camera.projection {
                     Projection::OrthographicHeight(height) => Projection::OrthographicHeight(height * unit),
-                    perspective @ Projection::PerspectiveFovDeg(_) => perspective,
+                    perspective => perspective,
                 };
                 let camera = Camera { eye: camera.eye * unit, projection, ..camera };
                 let camera = Camera { look_at: camera.look_at * unit, ..camera };

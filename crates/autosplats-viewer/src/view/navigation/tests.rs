@@ -21,6 +21,7 @@ fn on_screen(camera: &Camera, point: DVec3) -> DVec2 {
     let height = match camera.projection {
         Projection::PerspectiveFovDeg(fov) => 2.0 * (0.5 * fov).to_radians().tan() * offset.dot(forward),
         Projection::OrthographicHeight(height) => height,
+        Projection::Pinhole { .. } => unreachable!("not among these cameras"),
     };
     DVec2::new(offset.dot(right), offset.dot(down)) / height
 }
