@@ -68,10 +68,10 @@ mod tests {
 
     #[test]
     fn own_memory_remembers_its_peak() {
-        let Some([before, _]) = own_memory() else { return };
+        // Other tests take and free memory meanwhile.
         let bytes = vec![1_u8; 100 << 20];
-        let [with, _] = own_memory().expect("as before");
-        assert!(with > before + (90 << 20), "{before} bytes, and {with} with {} more", bytes.len());
+        let Some([with, _]) = own_memory() else { return };
+        assert!(with > 100 << 20, "{with} bytes with a vector of {}", bytes.len());
         drop(bytes);
         let [_, peak] = own_memory().expect("as before");
         assert!(peak >= with, "{peak} bytes at most, but {with} at once");
