@@ -234,7 +234,7 @@ mod tests {
             _progress: &dyn Progress,
             take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
         ) -> Result<(), Error> {
-            self.0.iter().try_for_each(|cloud| take(cloud))
+            self.0.iter().try_for_each(take)
         }
     }
 

@@ -247,7 +247,7 @@ fn text_without_heights_and_returns_and_in_other_units() {
             rows[1321] = format!("512000 5400000 {none}");
             rows[17] = "512001 5400000 nan".into();
             check_text("heights.xyz", &rows);
-            rows[99] = format!("512000 5400000 -32767");
+            rows[99] = "512000 5400000 -32767".into();
             check_text("two.xyz", &rows);
         }
     }

@@ -158,7 +158,7 @@ fn check_bytes_with(name: &str, bytes: &[u8], options: &[ReadOptions]) -> bool {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
-    options.iter().map(|options| check(&path, options)).fold(false, |any, in_parts| any || in_parts)
+    options.iter().filter(|options| check(&path, options)).count() > 0
 }
 
 /// Filters, one of which keeps no point.
