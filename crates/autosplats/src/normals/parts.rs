@@ -404,7 +404,7 @@ mod tests {
             positions[100 * i] = place;
         }
         let cloud = PointCloud::new(DVec3::ZERO, positions);
-        let parts = in_parts(&cloud, &NormalSettings::default(), 8000);
+        let parts = in_parts(&cloud, &NormalSettings::default(), 16_000);
         assert!((1..=4).contains(&parts.in_doubt()), "{} in doubt", parts.in_doubt());
     }
 
