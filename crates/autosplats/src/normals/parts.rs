@@ -384,7 +384,7 @@ mod tests {
         let up = Orientation::Direction(DVec3::Z);
         let seen = |points, z| Viewpoint { position: cloud.origin() + DVec3::new(0.5, 0.5, z), points };
         let viewpoints = Orientation::Viewpoints(vec![seen(0..9000, 5.0), seen(9000..20_000, -5.0)]);
-        for (orientation, points) in [(up.clone(), 8000), (up, 40_000), (viewpoints, 8000)] {
+        for (orientation, points) in [(up.clone(), 12_000), (up, 40_000), (viewpoints, 12_000)] {
             let settings = NormalSettings { orientation, ..NormalSettings::default() };
             let whole = estimate_normals(&cloud, &settings, &()).expect("settings are valid");
             let parts = in_parts(&cloud, &settings, points);
