@@ -42,13 +42,13 @@ impl Room {
     pub(super) fn spool(
         &self,
         path: &Path,
-        points: u64,
         options: &ReadOptions,
         progress: &dyn Progress,
     ) -> Result<Option<Spool>, Error> {
-        check_disk(&self.folder, points.saturating_mul(SPOOLED_BYTES + DISK_BYTES), "examining the points")?;
         let part = |start: f32| Part { whole: progress, start, len: 0.5 };
         let Some(parts) = open_parts(path, options, &part(0.0))? else { return Ok(None) };
+        let points = parts.points() as u64;
+        check_disk(&self.folder, points.saturating_mul(SPOOLED_BYTES + DISK_BYTES), "examining the points")?;
         Spool::of(&parts, &self.folder, &part(0.5)).map(Some)
     }
 }
