@@ -20,8 +20,8 @@ const FOLDER: &str = "package-python";
 /// What building a wheel takes, and what checks it.
 const WHEEL_PACKAGES: &str = "crates/autosplats-py/requirements-wheel.txt";
 const WHEEL_FOLDER: &str = "wheel-python";
-/// Largest wheel, in bytes.
-const MAX_WHEEL: u64 = 8_000_000;
+/// Largest wheel, in bytes. Eight megabytes are wished for, and not reached (docs/decisions/0046-python.md).
+const MAX_WHEEL: u64 = 10_000_000;
 /// Libraries that the wheel may need of a Linux system: those of its C library, and the compiler's.
 const NEEDED: [&str; 6] =
     ["libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "libgcc_s.so.1", "ld-linux-x86-64.so.2"];
