@@ -90,10 +90,8 @@ pub(crate) fn parts(
         }
         return Ok(None);
     };
+    // Of text the number was a guess. If it was too high, work in parts is right nevertheless.
     let points = clouds.points().unwrap_or(points);
-    if points.saturating_mul(need.memory) <= limit {
-        return Ok(None);
-    }
     check_disk(&folder, points.saturating_mul(SPOOLED_BYTES + need.disk), need.what).map_err(failed)?;
     let second = Part { whole: &bar, start: 0.5, len: 0.5 };
     let clouds = Spool::of(&*clouds, &folder, &second).map_err(failed)?;
