@@ -23,7 +23,9 @@ pub fn own_memory() -> Option<[u64; 2]> {
         let kibibytes = status.lines().find_map(|line| line.strip_prefix(name)?.trim().strip_suffix(" kB"))?;
         kibibytes.parse::<u64>().ok()?.checked_mul(1024)
     };
-    Some([bytes("VmRSS:")?, bytes("VmHWM:")?])
+    let now = bytes("VmRSS:")?;
+    // Each processor counts some pages of its own, so the system may state less than there is now.
+    Some([now, bytes("VmHWM:")?.max(now)])
 }
 
 /// Bounds of [`usual_memory`].
@@ -74,6 +76,8 @@ mod tests {
         assert!(with > 100 << 20, "{with} bytes with a vector of {}", bytes.len());
         drop(bytes);
         let [_, peak] = own_memory().expect("as before");
-        assert!(peak >= with, "{peak} bytes at most, but {with} at once");
+        // What processors count of their own is less than this.
+        let uncounted = 8 << 20;
+        assert!(peak + uncounted > with, "{peak} bytes at most, but {with} at once");
     }
 }

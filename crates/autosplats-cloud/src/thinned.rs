@@ -1,6 +1,7 @@
 //! Fewer points, and noisier points, of clouds that come in parts.
 
 use std::{
+    borrow::Cow,
     path::Path,
     sync::{
         Mutex,
@@ -92,18 +93,18 @@ impl<'a> Thinned<'a> {
     fn coarse(
         &self,
         progress: &dyn Progress,
-        take: &mut dyn FnMut(PointCloud, u64) -> Result<(), Error>,
+        take: &mut dyn FnMut(Cow<'_, PointCloud>, u64) -> Result<(), Error>,
     ) -> Result<u64, Error> {
         let (mut all, mut inside, mut left) = (0, 0, 0);
         self.clouds.read(progress, &mut |cloud| {
             all += cloud.len() as u64;
-            let mut cloud = cloud.clone();
+            let mut cloud = Cow::Borrowed(cloud);
             if let Some([min, max]) = self.thinning.bounds {
-                cloud.crop(min, max);
+                cloud.to_mut().crop(min, max);
             }
             if let Some(step) = self.thinning.every {
                 let (first, len) = (inside, cloud.len() as u64);
-                cloud.retain(|i| (first + i as u64).is_multiple_of(step as u64));
+                cloud.to_mut().retain(|i| (first + i as u64).is_multiple_of(step as u64));
                 inside += len;
             }
             let before = left;
@@ -196,13 +197,13 @@ impl Clouds for Thinned<'_> {
         let mut kept = 0;
         let all = self.coarse(progress, &mut |mut cloud, before| {
             if let Some(chosen) = &self.chosen {
-                cloud.retain(|i| {
+                cloud.to_mut().retain(|i| {
                     let number = before + i as u64;
                     chosen[(number / 64) as usize] >> (number % 64) & 1 > 0
                 });
             }
             if let Some((sigma, seed)) = self.thinning.noise {
-                cloud.add_noise_from(kept, sigma, seed, &())?;
+                cloud.to_mut().add_noise_from(kept, sigma, seed, &())?;
             }
             kept += cloud.len() as u64;
             take(&cloud)
