@@ -7,7 +7,9 @@ use autosplats::cloud::glam::DVec3;
 use autosplats::{
     NormalSettings, NormalsInParts, Orientation, PartsOptions, Viewpoint, estimate_normals, estimate_normals_in_parts,
 };
-use autosplats_cloud::{Axes, Clouds, LocalMetres, PointCloud, Progress, Thinned, Thinning, Unit, check_memory};
+use autosplats_cloud::{
+    Axes, Clouds, LocalMetres, PointCloud, Progress, Scan, Thinned, Thinning, Unit, add_scans, check_memory,
+};
 
 use crate::args::NormalsArgs;
 use crate::choices::OrientChoice;
@@ -15,7 +17,7 @@ use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{check_cloud_target, write_cloud};
-use crate::parts::{Need, Parts, WorkError, check_room, parts};
+use crate::parts::{Need, Parts, WorkError, check_room, parts, sample_step};
 use crate::progress::Bar;
 
 /// Bytes per point beside the cloud: the search tree and the result.
@@ -26,9 +28,6 @@ const CLOUD_BYTES: u64 = 100;
 
 /// Bytes per point that wait on the disk beside the points: positions, and results in two orders.
 const DISK_BYTES: u64 = 64;
-
-/// Of so many points one is looked at for the middle of all.
-const SAMPLE_STEP: usize = 256;
 
 const TO_GIVEN: &str = "to the given sensor";
 
@@ -110,13 +109,11 @@ struct Overview {
 
 impl Overview {
     fn of(clouds: &dyn Clouds) -> Result<Self, autosplats_cloud::Error> {
-        let (mut parts, mut viewpoints, mut points) = (Vec::new(), Vec::new(), 0);
+        let step = sample_step(clouds);
+        let (mut parts, mut scans, mut points) = (Vec::new(), Vec::new(), 0);
         let mut ends: Option<PointCloud> = None;
         clouds.read(&(), &mut |cloud| {
-            viewpoints.extend(cloud.scans().iter().map(|scan| Viewpoint {
-                position: scan.position(),
-                points: scan.points.start + points as usize..scan.points.end + points as usize,
-            }));
+            add_scans(&mut scans, cloud.scans(), points as usize);
             points += cloud.len() as u64;
             let finite = cloud.positions().iter().filter(|place| place.iter().all(|value| value.is_finite()));
             let none = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
@@ -132,11 +129,13 @@ impl Overview {
                 Some(ends) => ends.append(corners),
             }
             let mut few = cloud.clone();
-            few.keep_every(SAMPLE_STEP);
+            few.keep_every(step);
             few.retain_fields(|_| false);
             parts.push(few);
             Ok(())
         })?;
+        let viewpoint = |scan: Scan| Viewpoint { position: scan.position(), points: scan.points };
+        let viewpoints = scans.into_iter().map(viewpoint).collect();
         Ok(Self { sample: PointCloud::joined(parts.iter()), corners: ends.unwrap_or_default(), viewpoints, points })
     }
 

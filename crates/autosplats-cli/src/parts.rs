@@ -16,6 +16,14 @@ use crate::progress::Bar;
 /// Bytes that a point takes on the disk while it waits there, with all its values, in most scans.
 pub(crate) const SPOOLED_BYTES: u64 = 60;
 
+/// Points that a sample has at most, if their number is known.
+const SAMPLE: u64 = 1 << 17;
+
+/// Of so many points one is in the sample that stands for points in parts.
+pub(crate) fn sample_step(clouds: &dyn Clouds) -> usize {
+    clouds.points().unwrap_or(u64::from(u32::MAX)).div_ceil(SAMPLE).max(1) as usize
+}
+
 /// Points of the only input, which wait on the disk, and the room for work on them.
 pub(crate) struct Parts {
     pub(crate) clouds: Spool,

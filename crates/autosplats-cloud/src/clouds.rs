@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use crate::{Error, PointCloud, Progress};
+use crate::{Error, PointCloud, Progress, Scan};
 
 /// Points that come as clouds, one after another. Whoever works on them needs memory for a cloud, and not for all.
 ///
@@ -95,5 +95,34 @@ impl Clouds for Held<'_> {
         take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
     ) -> Result<(), Error> {
         take(self.cloud)
+    }
+}
+
+/// Adds the scans of a part of [`Clouds`], before which there are `before` points. A scan that goes on from the part
+/// before stays one.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{Scan, add_scans, glam::DMat4};
+///
+/// let scan = |points| Scan { name: Some("hall".into()), world_from_sensor: DMat4::IDENTITY, points };
+/// let mut all = Vec::new();
+/// add_scans(&mut all, &[scan(0..10)], 0);
+/// add_scans(&mut all, &[scan(0..5)], 10);
+/// assert_eq!(all, [scan(0..15)]);
+/// ```
+pub fn add_scans(all: &mut Vec<Scan>, part: &[Scan], before: usize) {
+    for scan in part {
+        let points = scan.points.start + before..scan.points.end + before;
+        match all.last_mut() {
+            Some(last)
+                if last.points.end == points.start
+                    && (&last.name, last.world_from_sensor) == (&scan.name, scan.world_from_sensor) =>
+            {
+                last.points.end = points.end;
+            }
+            _ => all.push(Scan { points, ..scan.clone() }),
+        }
     }
 }

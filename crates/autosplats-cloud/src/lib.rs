@@ -49,7 +49,7 @@ mod tree;
 pub use axes::Axes;
 pub use classes::class_name;
 pub use cloud::{Field, FieldValues, PointCloud, Scan};
-pub use clouds::{Clouds, Held, Outline};
+pub use clouds::{Clouds, Held, Outline, add_scans};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use encoding::{Unmarked, read_text};

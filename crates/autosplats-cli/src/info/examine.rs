@@ -239,7 +239,7 @@ impl Report {
         }
         self.resolution = like.resolution().map(Into::into).or(self.resolution);
         // The reader has already dropped invalid scans.
-        self.scans = scans;
+        self.scans = scans.iter().map(ScanFound::from).collect();
         self.attributes = values_of(clouds, &like, attributes, summaries, &part(0.2, 0.2))?;
         self.tidy();
         self.compare(header_bounds);

@@ -3,12 +3,13 @@
 use std::borrow::Cow;
 
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{Clouds, Crs, Error, FieldValues, PointCloud, Progress};
+use autosplats_cloud::{Clouds, Crs, Error, FieldValues, PointCloud, Progress, Scan, add_scans};
 use autosplats_formats::Attribute;
 use rayon::prelude::*;
 
-use super::report::{AttributeFound, ScanFound};
+use super::report::AttributeFound;
 use super::statistics::{Bins, Statistics, Summary, Values};
+use crate::parts::sample_step;
 
 /// Part of a cloud that an attribute becomes, if not a field of the same name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,13 +48,10 @@ pub(super) struct Surveyed<'a> {
     /// All points, or else a sample of them, with all attributes.
     pub(super) like: Cow<'a, PointCloud>,
     pub(super) crs: Crs,
-    pub(super) scans: Vec<ScanFound>,
+    pub(super) scans: Vec<Scan>,
     /// Of each of the [`rows`] of values.
     pub(super) summaries: Vec<Summary>,
 }
-
-/// Points of which one is in the sample of a cloud that comes in parts.
-const SAMPLE_STEP: usize = 64;
 
 pub(super) fn survey<'a>(
     clouds: &'a dyn Clouds,
@@ -71,9 +69,13 @@ pub(super) fn survey<'a>(
             .fold(|| none, |(min, max, count), position| (min.min(position), max.max(position), count + 1))
             .reduce(|| none, join);
         all = join(all, own);
-        points += cloud.len() as u64;
         crs = cloud.crs().clone();
-        scans.extend(cloud.scans().iter().map(ScanFound::from));
+        if clouds.whole().is_some() {
+            scans = cloud.scans().to_vec();
+        } else {
+            add_scans(&mut scans, cloud.scans(), points as usize);
+        }
+        points += cloud.len() as u64;
         let rows = rows(cloud, attributes);
         summaries.resize(rows.len(), Summary::NONE);
         for (summary, row) in summaries.iter_mut().zip(&rows) {
@@ -82,7 +84,7 @@ pub(super) fn survey<'a>(
         }
         if clouds.whole().is_none() {
             let mut sample = cloud.clone();
-            sample.keep_every(SAMPLE_STEP);
+            sample.keep_every(sample_step(clouds));
             few.push(sample);
         }
         Ok(())
