@@ -58,8 +58,8 @@ pub(crate) struct ConvertArgs {
 #[command(next_help_heading = "Running")]
 pub(crate) struct RoomArgs {
     /// Memory for points, such as 500M. One file or scene with more points is worked on in parts; meshes, compressed
-    /// PCD and what gzip compressed are read whole [default: three quarters of what is free; for octrees one quarter, at
-    /// most 2G]
+    /// PCD and what gzip compressed are read whole [default: three quarters of what is free; for octrees one quarter,
+    /// at most 2G]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,
     /// Folder for temporary files of work in parts [default: that of the output, or the system's]
