@@ -49,6 +49,9 @@ pub struct Thinned<'a> {
     kept: AtomicU64,
 }
 
+/// Takes points and the number of points before them.
+type TakeCoarse<'a> = dyn FnMut(Cow<'_, PointCloud>, u64) -> Result<(), Error> + 'a;
+
 impl<'a> Thinned<'a> {
     /// Prepares the work. For cubes all points are read once; their positions wait in a file without a name in
     /// `folder`, and `memory` bytes are used.
@@ -90,11 +93,7 @@ impl<'a> Thinned<'a> {
     }
 
     /// Passes on what cropping and counting leave, with the number of points before. Returns the number of all points.
-    fn coarse(
-        &self,
-        progress: &dyn Progress,
-        take: &mut dyn FnMut(Cow<'_, PointCloud>, u64) -> Result<(), Error>,
-    ) -> Result<u64, Error> {
+    fn coarse(&self, progress: &dyn Progress, take: &mut TakeCoarse<'_>) -> Result<u64, Error> {
         let (mut all, mut inside, mut left) = (0, 0, 0);
         self.clouds.read(progress, &mut |cloud| {
             all += cloud.len() as u64;
