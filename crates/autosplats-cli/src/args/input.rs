@@ -91,13 +91,26 @@ pub(crate) struct ReadingArgs {
 #[command(next_help_heading = "Scans larger than memory")]
 pub(crate) struct TreeArgs {
     /// Largest distance between neighbouring points on the screen, in pixels of the written picture: octrees (COPC,
-    /// EPT) are read as far as this needs; 0 reads all points [default: 1; 0 for files of less than 20 million points]
+    /// EPT) are read as far as this needs; 0 reads all points [default: 1; without --points-budget, 0 for files of less
+    /// than 20 million points]
     #[arg(long, value_name = "PX", value_parser = values::detail, allow_negative_numbers = true)]
-    pub(crate) detail: Option<f64>,
+    detail: Option<f64>,
     /// Most points that a picture is made of, such as 5M. If more are needed, the finest are left out everywhere
-    #[arg(long, value_name = "COUNT", value_parser = values::count, default_value = "10M")]
-    pub(crate) points_budget: usize,
+    /// [default: 10M]
+    #[arg(long, value_name = "COUNT", value_parser = values::count)]
+    points_budget: Option<usize>,
     /// Memory for the points of octrees and the picture, such as 500M [default: a quarter of what is free, at most 2G]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,
+}
+
+impl TreeArgs {
+    /// The detail that is asked for. Who names a budget wants no file whole.
+    pub(crate) fn detail(&self) -> Option<f64> {
+        self.detail.or(self.points_budget.map(|_| 1.0))
+    }
+
+    pub(crate) fn max_points(&self) -> usize {
+        self.points_budget.unwrap_or(10_000_000)
+    }
 }

@@ -67,7 +67,7 @@ impl Inputs {
         let trees: Vec<Option<PlacedTree>> = self.list.iter().map(open).collect::<Result<_, Failure>>()?;
         let Some(trees) = trees.into_iter().collect::<Option<Vec<_>>>() else {
             if always {
-                console.note("--detail is ignored: not all inputs are octrees (COPC, EPT), so all points are read");
+                console.note("--detail and --points-budget are ignored: not all inputs are octrees (COPC, EPT), so all points are read");
             }
             return Ok(None);
         };

@@ -19,7 +19,7 @@ const LEAST: u64 = 64 << 20;
 
 /// The trees of the inputs, unless these are to be read whole.
 pub(super) fn trees(job: &Job) -> Result<Option<Vec<PlacedTree>>, Failure> {
-    match job.tree.detail {
+    match job.tree.detail() {
         Some(0.0) => Ok(None),
         detail => job.inputs.trees(detail.is_some(), &job.console),
     }
@@ -59,7 +59,7 @@ pub(super) fn run(
 
 /// How fine the points shall be.
 pub(super) fn detail(job: &Job) -> Detail {
-    Detail { spacing_px: job.tree.detail.unwrap_or(1.0), max_points: job.tree.points_budget, ..Detail::default() }
+    Detail { spacing_px: job.tree.detail().unwrap_or(1.0), max_points: job.tree.max_points(), ..Detail::default() }
 }
 
 /// Opens the trees and reads the coarsest points, with the attributes that the picture shows.
@@ -91,7 +91,7 @@ pub(super) fn open(job: &Job, trees: Vec<PlacedTree>, bar: &Bar) -> Result<TreeS
         keep: job.inputs.kept(),
         ..Wanted::default()
     };
-    let scene = TreeScene::open(trees, wanted, memory(job)?, job.tree.points_budget, bar)?;
+    let scene = TreeScene::open(trees, wanted, memory(job)?, job.tree.max_points(), bar)?;
     job.check_color(scene.sample())?;
     Ok(scene)
 }

@@ -78,6 +78,8 @@ fn limits_make_pictures_coarser_and_say_so() {
     let limited = ["render", &lion, "-o", "a.png", "--size", "400x300", "--detail", "0.5", "--points-budget", "100K"];
     let outcome = folder.succeed(&limited);
     assert!(outcome.stderr.contains("pixels apart; a larger --points-budget"), "{}", outcome.stderr);
+    let few = report(&folder, &[&lion, "-o", "few.png", "--points-budget", "100K"]);
+    assert!(few["tree"]["points"].as_u64().is_some_and(|points| points <= 100_000), "a budget alone: {few}");
     folder.fail(&["render", &lion, "-o", "b.png", "--detail", "1", "--memory", "1M"], 2, &["--memory", "at least"]);
     // Little memory is no reason to fail while a picture without supersampling fits.
     let tight = ["render", &lion, "-o", "c.png", "--size", "800x600", "--detail", "1", "--memory", "300M"];
@@ -87,7 +89,7 @@ fn limits_make_pictures_coarser_and_say_so() {
         folder.fail(&["render", &lion, "-o", "b.png", "--detail", wrong], 2, &["--detail", "pixels"]);
     }
     folder.fail(&["render", &lion, "-o", "b.png", "--detail", "1", "--color", "Beauty"], 2, &["Beauty", "Intensity"]);
-    assert_eq!(folder.list(), ["a.png", "c.png"], "nothing else is written");
+    assert_eq!(folder.list(), ["a.png", "c.png", "few.png"], "nothing else is written");
 }
 
 #[test]
@@ -248,5 +250,5 @@ fn points_that_are_left_out_of_octrees_are_told() {
         assert_eq!(info["points"], 440, "{name}: {info}");
     }
     let ignored = folder.succeed(&["render", "wall.ply", "-o", "a.png", "--size", "64x48", "--detail", "1"]).stderr;
-    assert!(ignored.contains("--detail is ignored"), "{ignored}");
+    assert!(ignored.contains("--detail and --points-budget are ignored"), "{ignored}");
 }

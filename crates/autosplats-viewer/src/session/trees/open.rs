@@ -51,7 +51,8 @@ impl TreeOpener {
             _ => input.source.open_tree(options, progress).map_err(|error| why(error.into()))?,
         };
         if tree.is_none() && self.detail.is_some_and(|detail| detail > 0.0) {
-            progress.note("--detail is ignored: it is no octree (COPC, EPT), so all points are read");
+            progress
+                .note("--detail and --points-budget are ignored: it is no octree (COPC, EPT), so all points are read");
         }
         let Some(tree) = tree.filter(|tree| !self.reads_whole(input, &**tree)) else { return Ok(None) };
         let info = tree.info();
