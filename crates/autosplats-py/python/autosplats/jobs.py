@@ -4,7 +4,7 @@
 >>> job = jobs.tile_normals("tiles/*.laz", "normals")          # doctest: +SKIP
 >>> job.run(progress=True).raise_if_failed()                   # doctest: +SKIP
 
-A job runs in this process, or on many machines by `autosplats.ray`. Tasks hold paths and settings, so all machines need
+A job runs in this process (`python -m autosplats.jobs` from the shell), or on many machines by `autosplats.ray`. Tasks hold paths and settings, so all machines need
 the same paths. Outputs appear whole or not at all, are the same bytes whoever makes them, and those that are there are
 left alone. A manifest beside them, job.jsonl, has the settings and a row for each task. A job that is run again does
 what is missing, and what has changed. Other settings over old outputs are refused.
@@ -40,3 +40,10 @@ __all__ = [
     "tile_normals",
     "turntable",
 ]
+
+if __name__ == "__main__":
+    import sys
+
+    from ._jobs_command import main
+
+    sys.exit(main("here"))
