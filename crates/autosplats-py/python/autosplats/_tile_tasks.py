@@ -79,7 +79,6 @@ class NormalsTask(TileTask):
         own = around.own
         if len(own) == 0:
             return 0, 0
-        balls = None
         everywhere = float((np.nanmax(index.highs, axis=0) - np.nanmin(index.lows, axis=0))[:2].max())
         radius = max(index.halos[self.number], 1e-9 * everywhere)
         while len(own) + len(around.others) <= self.k and radius < 2 * everywhere:
@@ -89,13 +88,14 @@ class NormalsTask(TileTask):
             balls = Balls(xyz, np.full(len(xyz), radius))
             around = index.around(self.number, area, balls=balls, own=own)
         found = self.estimate(around)
-        balls = self.in_doubt(index, around, area, found.radius)
+        reach = self.reach(around, found.radius)
+        balls = reach[self.is_open(index, reach, area)]
         if len(balls):
+            # No neighbour is further away than those that are known, so this look suffices.
             around = index.around(self.number, area, balls=balls, own=own)
             found = self.estimate(around)
-            balls = self.in_doubt(index, around, area, found.radius)
-        # All that those reach has been read, but for tiles that cannot be.
-        lost = [balls.meet(index.lows[other], index.highs[other]) for other in around.lost]
+            reach = self.reach(around, found.radius)
+        lost = [reach.meet(index.lows[other], index.highs[other]) for other in around.lost]
         in_doubt = int(np.logical_or.reduce(lost).sum()) if lost else 0
         result = around.own.with_normals(found)
         kept = {name for name in result.fields if name in own.fields or name in self.fields}
@@ -113,18 +113,19 @@ class NormalsTask(TileTask):
         found = _core.estimate_normals(cloud._core, self.k, self.orient, self.sensor, None, None)
         return Normals(*(values[: len(around.own)] for values in found))
 
-    def in_doubt(self, index: Index, around: Around, area: Doubles, radius: npt.NDArray[np.float32]) -> Balls:
-        """Balls around points whose k-th neighbour may be a point of another tile, beyond the area."""
-        xyz = around.own.xyz
+    def reach(self, around: Around, radius: npt.NDArray[np.float32]) -> Balls:
+        """Balls around the tile's points up to the k-th neighbour."""
         neighbors = min(self.k, len(around.own) + len(around.others) - 1)
-        reach = radius.astype(np.float64) * (0.5 * max(neighbors, 1) ** 0.5 * _SLACK)
-        inside = np.minimum(xyz - area[0], area[1] - xyz).min(axis=1)
-        balls = Balls(xyz, reach)[reach >= inside]
-        if not len(balls):
-            return balls
-        others = index.meeting(balls.area(area), self.number)
-        meets = [balls.meet(index.lows[other], index.highs[other]) for other in others]
-        return balls[np.logical_or.reduce(meets)] if meets else balls[np.zeros(len(balls), dtype=bool)]
+        return Balls(around.own.xyz, radius.astype(np.float64) * (0.5 * max(neighbors, 1) ** 0.5 * _SLACK))
+
+    def is_open(self, index: Index, reach: Balls, area: Doubles) -> Mask:
+        """Which of them leave the area, where other tiles may have points."""
+        inside = np.minimum(reach.centers - area[0], area[1] - reach.centers).min(axis=1)
+        leaves: Mask = reach.radii >= inside
+        meets = np.zeros(len(reach), dtype=bool)
+        for other in index.meeting(reach[leaves].area(area), self.number):
+            meets |= reach.meet(index.lows[other], index.highs[other])
+        return leaves & meets
 
 
 @dataclass(frozen=True)

@@ -229,9 +229,9 @@ class Index:
         """Numbers of the tiles in whose halos a tile lies and that read its border from a file."""
         if self.tiles[number].is_tree:
             return []
-        halo = np.array(self.halos)[:, None] * [1.0, 1.0, np.inf]
+        halo = np.array(self.halos)[:, None]
         meets = (self.lows[number] <= self.highs + halo) & (self.highs[number] >= self.lows - halo)
-        found = meets.all(axis=1)
+        found = meets[:, :2].all(axis=1)
         found[number] = False
         numbers: list[int] = np.flatnonzero(found).tolist()
         return numbers
