@@ -99,7 +99,7 @@ impl Renderer {
         })
     }
 
-    /// Fixes what pictures of points that move share, by the first of them, rendered with `size` (width, height) pixels:
+    /// Fixes what pictures of moving points share, by the first of them, rendered with `size` (width, height) pixels:
     /// the exposure, and the values at both ends of the colour map, if colours show values.
     #[pyo3(signature = (cloud, camera, axes, size, settings, color))]
     #[allow(clippy::too_many_arguments, reason = "only the package's own Python calls it")]

@@ -6,7 +6,30 @@ from typing import Any, final
 import numpy as np
 import numpy.typing as npt
 
-__all__: list[str]
+__all__ = [
+    "Cloud",
+    "Frame",
+    "Recording",
+    "Renderer",
+    "VERSION",
+    "axes_of",
+    "check_camera",
+    "command",
+    "devices",
+    "encode_picture",
+    "estimate_normals",
+    "fit_camera",
+    "main",
+    "num_threads",
+    "outline",
+    "project",
+    "read_bytes",
+    "read_source",
+    "set_num_threads",
+    "tree_nodes",
+    "unproject",
+    "write",
+]
 VERSION: str
 
 _Floats = npt.NDArray[np.float32]
