@@ -89,7 +89,7 @@ class Spoiled(Task):
                 os.kill(os.getpid(), signal.SIGKILL)
             if self.fault == "flaky":
                 raise TimeoutError(110, "Connection timed out", self.outputs()[0])
-            time.sleep({"hang": 60.0, "slow": 2.0}[self.fault])
+            time.sleep({"hang": 120.0, "slow": 2.0}[self.fault])
         row = perform(self.task)
         assert row.error is None, row.error
         return row.points, row.in_doubt

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import subprocess
@@ -83,7 +84,8 @@ def test_without_neighbours_normals_differ(tiles, cloud, truth, tmp_path):
     (tmp_path / "out").mkdir()
     for path in tiles.iterdir():
         tile = autosplats.read(path)
-        autosplats.write(tile.with_normals(autosplats.estimate_normals(tile, orient="up")), tmp_path / "out" / path.name)
+        normals = autosplats.estimate_normals(tile, orient="up")
+        autosplats.write(tile.with_normals(normals), tmp_path / "out" / path.name)
     assert (angles(merged(tmp_path / "out"), truth) > 0.1).sum() > len(cloud) / 100
 
 
@@ -213,6 +215,13 @@ def test_other_settings_are_refused(tiles, alone, tmp_path):
     assert (tmp_path / "t00.laz").read_bytes() == b"something"
 
 
+def test_settings_by_which_all_failed_are_forgotten(tiles, alone, tmp_path):
+    report = jobs.tile_normals(tiles, tmp_path / "out", keep="grund").run()
+    assert len(report.failed) == 18 and "grund" in report.failed[0].error
+    jobs.tile_normals(tiles, tmp_path / "out").run().raise_if_failed()
+    assert contents(tmp_path / "out") == contents(alone)
+
+
 def test_a_torn_line_of_the_manifest_is_left_out(tiles, alone, tmp_path):
     job = jobs.tile_normals(tiles, tmp_path / "out")
     job.run()
@@ -281,18 +290,17 @@ def test_a_full_disk_leaves_whole_outputs(tiles, alone, tmp_path):
     # A small disk, which nobody else sees.
     script = f"""
         mount -t tmpfs -o size={size * 2 // 3} none {tmp_path} &&
-        {sys.executable} -m autosplats.jobs normals {tiles} -o {tmp_path}/out --quiet; echo $?; sha256sum {tmp_path}/out/*.laz;
+        {sys.executable} -m autosplats.jobs normals {tiles} -o {tmp_path}/out --quiet
+        echo $?
+        sha256sum {tmp_path}/out/*.laz
         find {tmp_path}/out ! -name '*.laz'
     """
-    done = subprocess.run(
-        ["unshare", "--map-root-user", "--mount", "sh", "-c", script], capture_output=True, text=True, timeout=60, check=False
-    )
+    command = ["unshare", "--map-root-user", "--mount", "sh", "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     if done.returncode and not done.stdout and not os.environ.get("CI"):
         pytest.skip(f"no disk can be mounted: {done.stderr}")
     report, rest = done.stdout.split("\n1\n")
     assert "failed" in report and "No space left on device" in report, done.stdout
-    import hashlib
-
     whole = {name: hashlib.sha256(data).hexdigest() for name, data in contents(alone).items()}
     lines = rest.splitlines()
     sums = dict(reversed(line.split()) for line in lines if line.endswith(".laz"))
@@ -313,7 +321,7 @@ def test_bad_arguments(tiles, tmp_path):
         (FileNotFoundError, "none", lambda: jobs.tile_normals(tmp_path / "none.laz", out)),
         (FileNotFoundError, "there are no tiles", lambda: jobs.tile_normals(f"{tmp_path}/*.laz", out)),
         (autosplats.ArgumentError, "in degrees", lambda: jobs.tile_normals(DATA / "scans/latlon_degrees.las", out)),
-        (autosplats.ArgumentError, "a name with one number", lambda: jobs.turntable("scene:statue:1K", "a.png", 3)),
+        (autosplats.ArgumentError, "a name with a number", lambda: jobs.turntable("scene:statue:1K", "a.png", 3)),
         (autosplats.ArgumentError, "cameras: there is none", lambda: jobs.fly("scene:statue:1K", out / "a_%d.png", [])),
         (TypeError, "colour: there is no", lambda: jobs.turntable("scene:statue:1K", out / "%d.png", 3, colour="rgb")),
         (
@@ -376,7 +384,7 @@ def pixels(png: bytes) -> np.ndarray:
 def test_the_command(tiles, alone, tmp_path):
     def run(*arguments: object) -> subprocess.CompletedProcess:
         command = [sys.executable, "-m", "autosplats.jobs", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
     done = run("normals", tiles, "-o", tmp_path / "out")
     assert done.returncode == 0 and done.stdout.startswith("9 tasks done; "), done.stderr

@@ -158,7 +158,7 @@ def _attempt(task: Task, retries: int) -> Row:
 
 
 def failed(task: Task, error: BaseException) -> Row:
-    """The row of a task that failed for good."""
+    """The row of a task that failed for good: its engine has given up."""
     return Row(task=task.name, inputs=task.inputs, error=told(error))
 
 
@@ -214,7 +214,8 @@ class Run:
         if not existed:
             there = next((path for task in job.tasks for path in task.outputs() if os.path.exists(path)), None)
             if there is not None:
-                raise ArgumentError(f"{there} is there, and no manifest tells of it; choose another output, or remove it")
+                remedy = "choose another output, or remove it"
+                raise ArgumentError(f"{there} is there, and no manifest tells of it; {remedy}")
         self._file = file = open(job.manifest, "a+", encoding="utf-8")
         try:
             _lock(file)
@@ -225,23 +226,32 @@ class Run:
                 file.truncate(sum(len(line.encode()) for line in lines[:-1]))
                 lines.pop()
             if not lines:
-                self._write(job.settings)
-                return {}
+                return self._anew()
             try:
                 settings, *rows = map(json.loads, lines)
                 known = {row["task"]: Row(**{**row, "notes": tuple(row["notes"])}) for row in rows}
             except (ValueError, TypeError, KeyError) as error:
                 raise ArgumentError(f"{job.manifest}: not the manifest of a job ({error}); remove it") from error
-            _check_settings(job, settings)
-            return known
+            differ = _difference(settings, json.loads(json.dumps(job.settings)))
+            if not differ:
+                return known
+            if not any(os.path.exists(path) for task in job.tasks for path in task.outputs()):
+                # All has failed, perhaps by these settings.
+                file.truncate(0)
+                return self._anew()
+            remedy = "choose another output, or remove them"
+            raise ArgumentError(f"{job.manifest}: the outputs there have {differ}; {remedy}")
         except BaseException:
             self._close()
             raise
 
-    @property
-    def job(self) -> Job:
-        """The job."""
-        return self._job
+    def _anew(self) -> dict[str, Row]:
+        """Begins the manifest, and removes what is left of a job of other settings."""
+        for step in self._job.steps[:-1]:
+            for path in (path for task in step for path in task.outputs()):
+                Path(path).unlink(missing_ok=True)
+        self._write(self._job.settings)
+        return {}
 
     def steps(self) -> Iterator[Sequence[Task]]:
         """The missing tasks of each step, the largest first. All of a step are to be performed before the next."""
@@ -292,14 +302,11 @@ def _is_done(task: Task, row: Row | None, there: set[str]) -> bool:
     return all(os.path.basename(path) in there for path in task.outputs())
 
 
-def _check_settings(job: Job, settings: object) -> None:
-    wanted = json.loads(json.dumps(job.settings))
-    if settings == wanted:
-        return
-    old = settings if isinstance(settings, dict) else {}
-    names = [name for name in {**old, **wanted} if old.get(name) != wanted.get(name)]
-    changes = ", ".join(f"{name} {json.dumps(old.get(name))}, not {json.dumps(wanted.get(name))}" for name in names)
-    raise ArgumentError(f"{job.manifest}: the outputs there have {changes}; choose another output, or remove them")
+def _difference(old: object, new: dict[str, object]) -> str:
+    """What differs in settings, in words; empty if nothing does."""
+    known = old if isinstance(old, dict) else {}
+    names = [name for name in {**known, **new} if known.get(name) != new.get(name)]
+    return ", ".join(f"{name} {json.dumps(known.get(name))}, not {json.dumps(new.get(name))}" for name in names)
 
 
 def _lock(file: IO[str]) -> None:

@@ -63,7 +63,8 @@ def _parser(engine: Literal["here", "ray"]) -> argparse.ArgumentParser:
     normals.add_argument("-k", type=int, default=10, help="number of neighbours, 3 to 1024 [default: 10]")
     normals.add_argument("--orient", choices=["up", "sensor"], default="up", help="side of normals [default: up]")
     normals.add_argument("--sensor", type=_numbers, metavar="X,Y,Z", help="where all points were seen from")
-    normals.add_argument("--values", type=_words, metavar="NAME,...", help="of normals, curvature, density [default: all]")
+    values = "of normals, curvature, density [default: all]"
+    normals.add_argument("--values", type=_words, metavar="NAME,...", help=values)
     normals.set_defaults(make=_normals)
 
     thin = _tiles(commands, "thin", "Keep one point per cube, exact up to the borders of tiles")

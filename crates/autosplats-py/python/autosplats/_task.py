@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import hashlib
+import json
 import logging
 import os
 import socket
@@ -143,6 +145,11 @@ def told(failure: BaseException) -> str:
         return f"{failure.filename or 'a file'}: {failure.strerror}"
     said = " ".join(str(failure).split())
     return said if isinstance(failure, (Error, OSError)) and said else f"{type(failure).__name__}: {said}"
+
+
+def digest(values: object) -> str:
+    """A short text that differs if the values do."""
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
 @contextmanager

@@ -4,10 +4,12 @@
 >>> job = jobs.tile_normals("tiles/*.laz", "normals")          # doctest: +SKIP
 >>> job.run(progress=True).raise_if_failed()                   # doctest: +SKIP
 
-A job runs in this process (`python -m autosplats.jobs` from the shell), or on many machines by `autosplats.ray`. Tasks hold paths and settings, so all machines need
-the same paths. Outputs appear whole or not at all, are the same bytes whoever makes them, and those that are there are
-left alone. A manifest beside them, job.jsonl, has the settings and a row for each task. A job that is run again does
-what is missing, and what has changed. Other settings over old outputs are refused.
+A job runs in this process (from the shell: `python -m autosplats.jobs`), or on many machines by `autosplats.ray`.
+
+Tasks hold paths and settings, so all machines need the same paths. Outputs appear whole or not at all, are the same
+bytes whoever makes them, and are left alone if they are there. A manifest beside them, job.jsonl, has the settings and
+a row for each task. A job that is run again does what is missing, and what has changed. Other settings over old outputs
+are refused.
 
 Whatever maps a function over a list can run a job:
 
@@ -20,10 +22,10 @@ Whatever maps a function over a list can run a job:
 
 from __future__ import annotations
 
-from ._frames import fly, frames, turntable
-from ._job import Job, JobError, Report, Run
+from ._frame_jobs import fly, frames, turntable
+from ._job import Job, JobError, Report, Run, failed
 from ._task import Row, Task, run_task
-from ._tile_tasks import copc_tiles, thin_tiles, tile_normals
+from ._tile_jobs import copc_tiles, thin_tiles, tile_normals
 
 __all__ = [
     "Job",
@@ -33,6 +35,7 @@ __all__ = [
     "Run",
     "Task",
     "copc_tiles",
+    "failed",
     "fly",
     "frames",
     "run_task",

@@ -80,6 +80,9 @@ def run(
         if ours:
             _connect(ray, address)
         try:
+            if ours and address is None:
+                # This machine may have fewer, and no other will come.
+                num_cpus = min(num_cpus, ray.cluster_resources().get("CPU", num_cpus))
             engine = _Engine(ray, started, num_cpus, num_gpus, memory, retries, speculate)
             for tasks in steps:
                 engine.perform(tasks)

@@ -1,11 +1,11 @@
-"""Pictures of points that move, and of points that a camera moves around."""
+"""Jobs of pictures: of points that move, and of points that a camera moves around."""
 
 from __future__ import annotations
 
-import json
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,16 +14,13 @@ import numpy as np
 from . import _core
 from ._camera import Axes, Camera, Size, View, checked_size
 from ._cloud import Cloud
-from ._errors import ArgumentError, EmptyError
+from ._errors import ArgumentError
 from ._files import shown
+from ._frame_tasks import FramesTask, Pictures, SettleTask
 from ._job import Job, work_of
-from ._play import Recording, play
-from ._render import Renderer
-from ._task import Task, unfinished
-from ._tiles import digest
+from ._play import play
+from ._task import digest
 
-#: Most frames that the camera is placed by, and fewest points that it can be placed by.
-_LOOKS, _LEAST = 5, 2
 #: Usual number of consecutive pictures of a task.
 _CHUNK = 16
 #: Arguments of `render` that pictures share.
@@ -41,116 +38,6 @@ _LOOK = (
     "settings",
     "supersample",
 )
-
-
-@dataclass(frozen=True)
-class Pictures:
-    """What all pictures of a job share, as far as it is known beforehand."""
-
-    #: A source that moves, or one that does not, with a camera a picture.
-    source: str
-    #: Arguments of `autosplats.play`; None for points that do not move.
-    playing: Mapping[str, Any] | None
-    size: Size
-    view: View
-    #: Camera as JSON; None for one that sees all.
-    camera: str | None
-    axes: Axes | None
-    #: Further arguments of `Renderer.render`.
-    look: Mapping[str, Any]
-    backend: Literal["auto", "cpu", "gpu"]
-
-    def open(self) -> Recording | Cloud:
-        """The points."""
-        if self.playing is None:
-            return Cloud._of(shown(self.source))
-        return play(self.source, **self.playing)
-
-
-@dataclass(frozen=True)
-class SettleTask(Task):
-    """Settles once what all pictures share: camera, axes, exposure, and the ends of the colour map."""
-
-    pictures: Pictures
-    first: int
-    last: int
-    camera: str | None
-    #: File for the result, which stays beside the pictures.
-    settled: str
-
-    def outputs(self) -> Sequence[str]:
-        return [self.settled]
-
-    def run(self, device: int | str | None) -> tuple[int, int]:
-        pictures = self.pictures
-        first, everything = self.clouds(pictures.open())
-        if not _has(everything, _LEAST):
-            raise EmptyError(f"{pictures.source}: there are no points in these frames")
-        axes = pictures.axes or _core.axes_of(everything._core)
-        camera = self.camera or pictures.camera
-        if camera is None:
-            camera = _core.fit_camera(everything._core, pictures.view, pictures.size, axes, None, False)
-        renderer = Renderer(pictures.backend, device=_chosen(pictures, device))
-        exposure, value_range = renderer._settled(
-            first, Camera.from_json(camera), pictures.size, axes, pictures.look
-        )
-        values = {"camera": camera, "axes": axes, "exposure": exposure, "value_range": value_range}
-        with unfinished(self.settled, self.work) as path:
-            Path(path).write_text(json.dumps(values), encoding="utf-8")
-        return 1, 0
-
-    def clouds(self, points: Recording | Cloud) -> tuple[Cloud, Cloud]:
-        """The first frame with points, and the points of some frames, as the command looks at them."""
-        if isinstance(points, Cloud):
-            return points, points
-        start = next((frame for frame in range(self.first, self.last + 1) if _has(points[frame], _LEAST)), self.first)
-        count = min(self.last - start + 1, _LOOKS)
-        looks = sorted({start + (self.last - start) * look // max(count - 1, 1) for look in range(count)})
-        clouds = [points[frame] for frame in looks]
-        everything = Cloud._of(_core.Cloud.merged([cloud._core for cloud in clouds]))
-        return next((cloud for cloud in clouds if _has(cloud, _LEAST)), everything), everything
-
-
-def _has(cloud: Cloud, count: int) -> bool:
-    return len(cloud) >= count and int(np.isfinite(cloud.positions).all(axis=1).sum()) >= count
-
-
-def _chosen(pictures: Pictures, device: int | str | None) -> int | str | None:
-    return None if pictures.backend == "cpu" else device
-
-
-@dataclass(frozen=True)
-class FramesTask(Task):
-    """Renders consecutive pictures. Those that are there are left alone."""
-
-    pictures: Pictures
-    #: Number and file of each picture.
-    files: tuple[tuple[int, str], ...]
-    #: Camera of each picture as JSON, if each has its own.
-    cameras: tuple[str, ...]
-    settled: str
-
-    def outputs(self) -> Sequence[str]:
-        return [path for _, path in self.files]
-
-    def needs(self) -> Sequence[str]:
-        return [self.settled]
-
-    def run(self, device: int | str | None) -> tuple[int, int]:
-        pictures = self.pictures
-        settled = json.loads(Path(self.settled).read_text(encoding="utf-8"))
-        look = {**pictures.look, "exposure": settled["exposure"], "value_range": settled["value_range"]}
-        points = pictures.open()
-        renderer = Renderer(pictures.backend, device=_chosen(pictures, device))
-        for place, (frame, output) in enumerate(self.files):
-            if os.path.exists(output):
-                continue
-            cloud = points if isinstance(points, Cloud) else points[frame]
-            camera = Camera.from_json(self.cameras[place] if self.cameras else settled["camera"])
-            picture = renderer.render(cloud, camera=camera, size=pictures.size, axes=settled["axes"], **look)
-            with unfinished(output, self.work) as path:
-                picture.save(path)
-        return len(self.files), 0
 
 
 def frames(
@@ -275,14 +162,11 @@ def around(start: Camera, count: int, up: Sequence[float]) -> Iterator[Camera]:
     for number in range(count):
         angle = 2 * np.pi * number / count
         cos, sin = np.cos(angle), np.sin(angle)
-
-        def turned(vector: Any) -> tuple[float, float, float]:
-            # The formula of Rodrigues.
-            x, y, z = cos * vector + sin * np.cross(axis, vector) + (1 - cos) * axis * (axis @ vector)
-            return float(x), float(y), float(z)
-
-        eye = middle + np.array(turned(np.array(start.eye) - middle))
-        yield Camera(tuple(eye), start.look_at, turned(np.array(start.up)), fov=start.fov, height=start.height)
+        # The formula of Rodrigues, for the sight and for the direction that is up.
+        vectors = np.array([start.eye - middle, start.up])
+        along = np.outer(vectors @ axis, axis)
+        sight, above = cos * vectors + sin * np.cross(axis, vectors) + (1 - cos) * along
+        yield replace(start, eye=tuple(middle + sight), up=tuple(above))
 
 
 def _up(axes: str | None) -> Sequence[float]:
@@ -311,27 +195,22 @@ def _checked(look: Mapping[str, Any]) -> dict[str, Any]:
         raise TypeError(f"{unknown[0]}: there is no such argument; there are {', '.join(_LOOK)}")
     averaged = (look.get("settings") or {}).get("frames_averaged", 1)
     if averaged != 1:
-        raise ArgumentError("settings: with frames_averaged a picture depends on earlier ones, which other tasks render")
+        raise ArgumentError("settings: with frames_averaged pictures depend on earlier ones, of other tasks")
     return {"supersample": 1, **look}
 
 
 def _picture_job(
     pictures: Pictures, numbers: range, cameras: Sequence[Camera], output: str | os.PathLike[str], chunk: int
 ) -> Job:
-    pattern = os.path.abspath(output)
-    try:
-        files = [(number, pattern % number) for number in numbers]
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"output is '{output}', must be a name with one number, such as f_%05d.png") from error
-    if len({path for _, path in files}) < len(files) or any(os.path.dirname(pattern) != os.path.dirname(path) for _, path in files):
-        raise ArgumentError(f"output is '{output}', must be a name with one number, such as f_%05d.png")
+    folder, name = os.path.split(os.path.abspath(output))
+    if re.fullmatch(r"[^%]*%0?\d*d[^%]*", name) is None:
+        raise ArgumentError(f"output is '{output}', must be a name with a number, such as f_%05d.png")
+    files = [(number, os.path.join(folder, name % number)) for number in numbers]
     if chunk < 1:
         raise ArgumentError(f"chunk is {chunk}, must be 1 or more")
-    # A sequence's name is a pattern.
-    plain = os.path.splitext(pattern)[0]
+    plain = os.path.join(folder, os.path.splitext(name)[0])
     manifest, settled = Path(plain + ".job.jsonl"), plain + ".settled.json"
     work = str(work_of(manifest))
-    stamp = _stamp(pictures.source)
     texts = tuple(camera.to_json() for camera in cameras)
     points = 0
     if pictures.playing is None and not pictures.source.startswith("scene:"):
@@ -339,7 +218,7 @@ def _picture_job(
     settle = SettleTask(
         name="settling",
         points=points,
-        inputs=stamp,
+        inputs="",
         work=work,
         pictures=pictures,
         first=numbers[0],
@@ -350,10 +229,8 @@ def _picture_job(
     tasks = []
     for start in range(0, len(files), chunk):
         part = tuple(files[start : start + chunk])
-        name = f"{part[0][0]}..{part[-1][0]}"
-        own = texts[start : start + chunk]
-        inputs = digest([stamp, own])
-        tasks.append(FramesTask(name, points, inputs, work, pictures, part, own, settled))
+        span = f"{part[0][0]}..{part[-1][0]}"
+        tasks.append(FramesTask(span, points, "", work, pictures, part, texts[start : start + chunk], settled))
     settings = {
         "source": pictures.source,
         "playing": pictures.playing,
@@ -363,18 +240,16 @@ def _picture_job(
         "axes": pictures.axes,
         "look": pictures.look,
         "backend": pictures.backend,
+        # A recording may grow: its pictures stay as they are.
+        "stamp": _stamp(pictures.source) if pictures.playing is None else "",
+        "cameras": digest(texts),
     }
     return Job("frames", settings, manifest, [[settle], tasks], unit="pictures")
 
 
 def _stamp(source: str) -> str:
-    """Size and time of a file, or of what a folder has."""
-    if not os.path.exists(source):
+    """Size and time of a file."""
+    if not os.path.isfile(source):
         return ""
-    paths = [source]
-    if os.path.isdir(source):
-        paths += sorted(entry.path for entry in os.scandir(source))
-    return digest([[path, os.stat(path).st_size, os.stat(path).st_mtime_ns] for path in paths])
-
-
-
+    found = os.stat(source)
+    return f"{found.st_size} {found.st_mtime_ns}"
