@@ -1,5 +1,7 @@
 //! What jobs over many files plan by: outlines of files, and the nodes of octrees.
 
+use std::path::Path;
+
 use autosplats_cloud::{Crs, Key, Node, Progress, Tree};
 use autosplats_formats::{Description, ReadOptions, describe};
 use autosplats_sources::Source;
@@ -11,7 +13,7 @@ use crate::convert;
 use crate::errors::Failure;
 use crate::wait::run;
 
-/// What the header of a file or of an octree states, in milliseconds.
+/// What the header of a file or of an octree states.
 struct Outline {
     points: Option<u64>,
     bounds: Option<[[f64; 3]; 2]>,
@@ -19,22 +21,31 @@ struct Outline {
     is_tree: bool,
 }
 
+impl Outline {
+    fn of(name: &str, progress: &dyn Progress) -> Result<Self, Failure> {
+        let options = ReadOptions::default();
+        let source = Source::parse(name)?;
+        if let Some(tree) = source.open_tree(&options, progress)? {
+            let info = tree.info();
+            let bounds = Some(info.bounds.map(|corner| corner.to_array()));
+            return Ok(Self { points: Some(info.points), bounds, crs: info.crs.clone(), is_tree: true });
+        }
+        let Description { points, bounds, crs, .. } = describe(name.as_ref(), &options)?;
+        let bounds = bounds.map(|bounds| bounds.map(|corner| corner.to_array()));
+        Ok(Self { points, bounds, crs, is_tree: false })
+    }
+}
+
 /// Number of points, least and greatest coordinates, name of the unit of x and y, and whether parts of the file can be
 /// read without the rest. Values that the header does not state are None.
 #[pyfunction]
 pub(crate) fn outline<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
-    let found = run(py, Some(1), None, |watch| {
-        let options = ReadOptions::default();
-        let source = Source::parse(name)?;
-        if let Some(tree) = source.open_tree(&options, watch)? {
-            let info = tree.info();
-            let bounds = Some(info.bounds.map(|corner| corner.to_array()));
-            return Ok(Outline { points: Some(info.points), bounds, crs: info.crs.clone(), is_tree: true });
-        }
-        let Description { points, bounds, crs, .. } = describe(name.as_ref(), &options)?;
-        let bounds = bounds.map(|bounds| bounds.map(|corner| corner.to_array()));
-        Ok(Outline { points, bounds, crs, is_tree: false })
-    })?;
+    let found = if Path::new(name).is_file() {
+        // A header takes less time than a thread that waits for signals.
+        py.detach(|| Outline::of(name, &())).map_err(Failure::raise)?
+    } else {
+        run(py, Some(1), None, |watch| Outline::of(name, watch))?
+    };
     let values = PyDict::new(py);
     values.set_item("points", found.points)?;
     values.set_item("bounds", found.bounds)?;

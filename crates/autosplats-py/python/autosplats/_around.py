@@ -39,11 +39,11 @@ class Around:
 class Index:
     """All tiles of a job, as each task finds them in a file."""
 
-    def __init__(self, tiles: Sequence[Tile], halos: Sequence[float], borders: Sequence[str], keep: str | None) -> None:
+    def __init__(self, tiles: Sequence[Tile], halos: Sequence[float], borders: list[str], keep: str | None) -> None:
         self.tiles = tiles
         #: Width around each tile, in world units, in which points of other tiles are looked for first.
         self.halos = halos
-        #: Files with the points of each tile that lie near others.
+        #: Files with the points of each tile that lie near others; empty if nobody needs one.
         self.borders = borders
         self.keep = keep
         nowhere = (np.nan,) * 3
@@ -86,10 +86,8 @@ class Index:
             return []
         return self.meeting(self.area(number, self.halos[number]), number)
 
-    def border_of(self, number: int) -> list[int]:
-        """Numbers of the tiles in whose halos a tile lies and that read its border from a file."""
-        if self.tiles[number].is_tree:
-            return []
+    def towards(self, number: int) -> list[int]:
+        """Numbers of the tiles in whose halos a tile lies."""
         halo = np.array(self.halos)[:, None]
         meets = (self.lows[number] <= self.highs + halo) & (self.highs[number] >= self.lows - halo)
         found = meets[:, :2].all(axis=1)
@@ -214,13 +212,13 @@ class BorderTask(Task):
     number: int
 
     def outputs(self) -> Sequence[str]:
-        return [border_path(self.work, self.number, self.inputs)]
+        return [os.path.join(self.work, f"border-{self.number}-{self.inputs}.npy")]
 
     def run(self, device: int | str | None) -> tuple[int, int]:
         index = Index.load(self.index)
         xyz = index.read(self.number).xyz
         near = np.zeros(len(xyz), dtype=bool)
-        for other in index.border_of(self.number):
+        for other in index.towards(self.number):
             near |= _within(xyz, index.area(other, index.halos[other]))
         buffer = io.BytesIO()
         np.save(buffer, xyz[near])
@@ -229,27 +227,44 @@ class BorderTask(Task):
         return int(near.sum()), 0
 
 
-def border_path(work: str, number: int, inputs: str) -> str:
-    """The file with the border of a tile."""
-    return os.path.join(work, f"border-{number}-{inputs}.npy")
+@dataclass(frozen=True)
+class Plan:
+    """What each tile reads of others."""
+
+    index: Index
+    #: Tasks that write the borders of files.
+    borders: Sequence[BorderTask]
+    #: Digest of what each tile reads.
+    inputs: Sequence[str]
+    #: Files with borders that each tile reads.
+    needs: Sequence[tuple[str, ...]]
 
 
-def planned(
-    tiles: Sequence[Tile], halos: Sequence[float] | None, keep: str | None, work: str
-) -> tuple[Index, list[BorderTask], list[str]]:
-    """The index of a job, the tasks that write borders, and the digest of what each tile reads. Without halos, tiles
-    have nothing to do with each other."""
+def planned(tiles: Sequence[Tile], halos: Sequence[float] | None, keep: str | None, work: str) -> Plan:
+    """What tiles read of others within their halos. Without halos, they have nothing to do with each other."""
     index = Index(tiles, halos or [-np.inf] * len(tiles), [""] * len(tiles), keep)
-    path = os.path.join(work, "index.json")
-    borders, names, inputs = [], [], []
+    near = [index.near(number) for number in range(len(tiles))]
+    towards: list[list[int]] = [[] for _ in tiles]
+    for number, others in enumerate(near):
+        for other in others:
+            towards[other].append(number)
+    borders = []
     for number, tile in enumerate(tiles):
-        near = index.near(number)
-        read = [[tiles[other].path, tiles[other].stamp] for other in near]
-        inputs.append(digest([tile.path, tile.stamp, index.halos[number], *read]))
-        towards = index.border_of(number)
-        around = digest([tile.path, tile.stamp, *(index.area(other, index.halos[other]).tolist() for other in towards)])
-        names.append(border_path(work, number, around))
-        if towards:
-            borders.append(BorderTask(f"border of {tile.name}", tile.points, around, work, path, number))
-    index.borders = names
-    return index, borders, inputs
+        if towards[number] and not tile.is_tree:
+            areas = [index.area(other, index.halos[other]).tolist() for other in towards[number]]
+            read = digest([tile.path, tile.stamp, areas])
+            task = BorderTask(f"border of {tile.name}", tile.points, read, work, index_path(work), number)
+            index.borders[number] = task.outputs()[0]
+            borders.append(task)
+    stamps = [[tile.path, tile.stamp] for tile in tiles]
+    inputs = [
+        digest([stamps[number], index.halos[number], *(stamps[other] for other in others)])
+        for number, others in enumerate(near)
+    ]
+    needs = [tuple(index.borders[other] for other in others if index.borders[other]) for others in near]
+    return Plan(index, borders, inputs, needs)
+
+
+def index_path(work: str) -> str:
+    """The file with the index of a job."""
+    return os.path.join(work, "index.json")

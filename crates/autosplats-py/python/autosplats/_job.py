@@ -210,8 +210,7 @@ class Run:
         """Opens the manifest for this run alone, and returns the rows that it has."""
         job = self._job
         job.manifest.parent.mkdir(parents=True, exist_ok=True)
-        existed = job.manifest.exists()
-        if not existed:
+        if not job.manifest.exists():
             there = next((path for task in job.tasks for path in task.outputs() if os.path.exists(path)), None)
             if there is not None:
                 remedy = "choose another output, or remove it"
@@ -294,8 +293,8 @@ class Run:
 
 def _is_done(task: Task, row: Row | None, there: set[str]) -> bool:
     """Whether a task's outputs are there, of what is read now."""
-    if row is not None and row.error is None:
-        if row.inputs != task.inputs or row.in_doubt:
+    if row is not None:
+        if row.error is not None or row.inputs != task.inputs or row.in_doubt:
             return False
         if row.points == 0:
             return True

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from ._around import planned
+from ._around import index_path, planned
 from ._camera import _vector
 from ._errors import ArgumentError
 from ._job import Job, work_of
@@ -206,9 +206,8 @@ def _tile_job(
         raise ArgumentError(f"{folder}: outputs cannot lie beside the tiles; name another folder")
     manifest = folder / "job.jsonl"
     work = work_of(manifest)
-    file = work / "index.json"
-    index, first, inputs = planned(tiles, halos, keep, str(work))
-    written = {border.number: border.outputs()[0] for border in first}
+    plan = planned(tiles, halos, keep, str(work))
+    file = index_path(str(work))
     last = []
     for number, tile in enumerate(tiles):
         name = f"{tile.name}.{format.lstrip('.')}"
@@ -216,14 +215,14 @@ def _tile_job(
             task(
                 name=name,
                 points=tile.points,
-                inputs=inputs[number],
+                inputs=plan.inputs[number],
                 work=str(work),
                 output=str(folder / name),
-                index=str(file),
+                index=file,
                 number=number,
-                borders=tuple(written[other] for other in index.near(number) if other in written),
+                borders=plan.needs[number],
                 **own,
             )
         )
     settings = {**own, "format": format, "keep": keep}
-    return Job(kind, settings, manifest, [first, last], prepare=lambda: index.save(file))
+    return Job(kind, settings, manifest, [plan.borders, last], prepare=lambda: plan.index.save(Path(file)))
