@@ -96,6 +96,37 @@ def test_normals_of_boxes_of_an_octree(octree, dense, tmp_path):
     are_exact(tmp_path / "out", dense, autosplats.estimate_normals(dense, orient="up"))
 
 
+def test_normals_of_boxes_of_an_ept(dense, tmp_path):
+    write_ept(dense, tmp_path / "scan")
+    job = jobs.tile_normals(tmp_path / "scan/ept.json", tmp_path / "out", box_points=60_000)
+    assert len(job.tasks) >= 4 and all(task.name.startswith("scan_") for task in job.tasks)
+    job.run().raise_if_failed()
+    are_exact(tmp_path / "out", dense, autosplats.estimate_normals(dense, orient="up"))
+
+
+def write_ept(cloud: autosplats.Cloud, folder: Path) -> None:
+    """Writes an octree of a root and the nodes below it."""
+    for name in ("ept-data", "ept-hierarchy"):
+        (folder / name).mkdir(parents=True)
+    low = np.floor(cloud.bounds[0])
+    half = np.ceil((cloud.bounds[1] - low).max() / 2)
+    octant = np.floor((cloud.xyz - low) / half).astype(int).clip(0, 1)
+    is_root = np.arange(len(cloud)) % 9 == 0
+    counts = {}
+    for key in [None, *map(tuple, np.unique(octant, axis=0).tolist())]:
+        which = is_root if key is None else (octant == key).all(axis=1) & ~is_root
+        name = "0-0-0-0" if key is None else "1-{}-{}-{}".format(*key)
+        autosplats.write(cloud[which], folder / f"ept-data/{name}.laz")
+        counts[name] = int(which.sum())
+    (folder / "ept-hierarchy/0-0-0-0.json").write_text(json.dumps(counts))
+    bounds = [*low, *(low + 2 * half)]
+    axes = [{"name": name, "type": "signed", "size": 4, "scale": 0.001, "offset": 0} for name in "XYZ"]
+    facts = {"bounds": bounds, "boundsConforming": [*cloud.bounds[0], *cloud.bounds[1]], "dataType": "laszip"}
+    facts |= {"hierarchyType": "json", "points": len(cloud), "span": 128, "version": "1.1.0", "srs": {}}
+    facts["schema"] = [*axes, {"name": "id", "type": "unsigned", "size": 4}]
+    (folder / "ept.json").write_text(json.dumps(facts))
+
+
 def test_octrees_side_by_side_need_no_borders(tiles, cloud, truth, tmp_path):
     jobs.copc_tiles(tiles, tmp_path / "copc").run().raise_if_failed()
     job = jobs.tile_normals(f"{tmp_path}/copc/*.copc.laz", tmp_path / "out", values=["normals", "density"])

@@ -14,7 +14,7 @@ import numpy as np
 from . import _core
 from ._camera import Axes, Camera, Size, View
 from ._cloud import Cloud
-from ._errors import EmptyError
+from ._errors import EmptyError, Error
 from ._files import shown
 from ._play import Recording, play
 from ._render import Renderer
@@ -119,6 +119,8 @@ class FramesTask(Task):
 
     def run(self, device: int | str | None) -> tuple[int, int]:
         pictures = self.pictures
+        if not os.path.exists(self.settled):
+            raise Error(f"{self.settled} is missing: what pictures share could not be settled")
         settled = json.loads(Path(self.settled).read_text(encoding="utf-8"))
         look = {**pictures.look, "exposure": settled["exposure"], "value_range": settled["value_range"]}
         points = pictures.open()
