@@ -68,7 +68,8 @@ class Spoiled(Task):
     """A task that something happens to in its first attempt."""
 
     task: Task
-    #: "kill" for the process's end with a file begun, "flaky" for a share that fails, "hang" or "slow".
+    #: "kill" for the process's end with a file begun, "flaky" for a share that fails, "hang", "slow", or the machine
+    #: of Ray that will not be lost: others hang, and this one waits for the first that does.
     fault: str
 
     def outputs(self) -> Sequence[str]:
@@ -89,10 +90,25 @@ class Spoiled(Task):
                 os.kill(os.getpid(), signal.SIGKILL)
             if self.fault == "flaky":
                 raise TimeoutError(110, "Connection timed out", self.outputs()[0])
-            time.sleep({"hang": 120.0, "slow": 2.0}[self.fault])
+            if self.fault in ("hang", "slow"):
+                time.sleep({"hang": 120.0, "slow": 2.0}[self.fault])
+            else:
+                self.wait_for_loss()
         row = perform(self.task)
         assert row.error is None, row.error
         return row.points, row.in_doubt
+
+    def wait_for_loss(self) -> None:
+        import ray
+
+        sign = Path(self.work) / "hanging"
+        is_lost = ray.get_runtime_context().get_node_id() != self.fault
+        if is_lost:
+            sign.touch()
+        for _ in range(1200):
+            if sign.exists() and not is_lost:
+                return
+            time.sleep(0.1)
 
 
 def spoil(job: Job, faults: dict[str, str]) -> Job:
