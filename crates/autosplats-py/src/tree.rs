@@ -57,6 +57,7 @@ pub(crate) fn outline<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, P
 /// Nodes of an octree that have points: lowest and highest corners (n, 3) in world coordinates, numbers of points (n)
 /// and of stored bytes (n), from coarse to fine. None for what is no octree.
 #[pyfunction]
+#[allow(clippy::type_complexity, reason = "four arrays")]
 pub(crate) fn tree_nodes<'py>(
     py: Python<'py>,
     name: &str,

@@ -76,7 +76,7 @@ class Task(ABC):
     work: str
 
     #: Memory per point in bytes.
-    bytes_per_point = 220
+    bytes_per_point = 300
 
     @property
     def memory(self) -> int:
