@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -92,7 +93,9 @@ def test_without_neighbours_normals_differ(tiles, cloud, truth, tmp_path):
 def test_normals_of_boxes_of_an_octree(octree, dense, tmp_path):
     job = jobs.tile_normals(octree, tmp_path / "out", box_points=30_000)
     assert len(job.tasks) >= 6
-    job.run().raise_if_failed()
+    report = job.run()
+    report.raise_if_failed()
+    assert not any(row.notes for row in report.rows)
     are_exact(tmp_path / "out", dense, autosplats.estimate_normals(dense, orient="up"))
 
 
@@ -286,6 +289,24 @@ def test_a_malformed_tile_fails_alone(cloud, truth, tmp_path):
     report.raise_if_failed()
     assert report.in_doubt == 0
     are_exact(tmp_path / "out", cloud, truth)
+
+
+def test_borders_that_a_machine_does_not_see(tiles, alone, tmp_path):
+    job = jobs.tile_normals(tiles, tmp_path / "out")
+    job.steps = [[], job.tasks]
+    job.run().raise_if_failed()
+    assert contents(tmp_path / "out") == contents(alone), "whole tiles are read in their place"
+
+
+def test_a_header_that_states_less_is_noted(cloud, tmp_path):
+    tiles = in_tiles(cloud, tmp_path / "tiles")
+    data = bytearray((tiles / "t11.laz").read_bytes())
+    # The largest x of the header of LAS.
+    struct.pack_into("<d", data, 179, struct.unpack_from("<d", data, 179)[0] - 10)
+    (tiles / "t11.laz").write_bytes(data)
+    report = jobs.tile_normals(tiles, tmp_path / "out").run()
+    (row,) = (row for row in report.rows if row.task == "t11.laz")
+    assert any("outside of the header's bounds" in note for note in row.notes)
 
 
 def test_flaky_shares_are_tried_again(tiles, alone, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -15,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ._cloud import Cloud
-from ._errors import Error, FormatError
+from ._errors import FormatError
 from ._files import read
-from ._task import Task, digest, unfinished
+from ._task import Task, digest, is_flaky, unfinished, unseen
 from ._tiles import Doubles, Tile
 
 Mask = npt.NDArray[np.bool_]
@@ -64,7 +65,10 @@ class Index:
     @staticmethod
     def load(path: str) -> Index:
         """Reads the file once a process."""
-        found = os.stat(path)
+        try:
+            found = os.stat(path)
+        except FileNotFoundError:
+            raise unseen(path, "the list of tiles is missing") from None
         return _loaded(path, found.st_mtime_ns, found.st_size)
 
     def area(self, number: int, halo: float) -> Doubles:
@@ -100,7 +104,12 @@ class Index:
         tile = self.tiles[number]
         if tile.fault is not None:
             raise FormatError(tile.fault)
-        return read(tile.path, keep=self.keep, bounds=bounds if tile.is_tree else None)
+        cloud = read(tile.path, keep=self.keep, bounds=bounds if tile.is_tree else None)
+        ends = cloud.bounds if tile.box is None and bounds is None else None
+        if ends is not None and ((ends[0] < self.lows[number]) | (ends[1] > self.highs[number])).any():
+            what = "%s: there are points outside of the header's bounds, which tiles around do not look for"
+            logging.getLogger("autosplats").info(what, tile.path)
+        return cloud
 
     def own(self, number: int) -> Cloud:
         """Points of a tile."""
@@ -118,7 +127,9 @@ class Index:
         for other in self.meeting(everything, number):
             try:
                 xyz = self._points(other, area, balls)
-            except (Error, OSError):
+            except (FormatError, OSError) as error:
+                if is_flaky(error):
+                    raise
                 lost.append(other)
                 continue
             parts.append(xyz)
@@ -148,7 +159,11 @@ class Index:
             return xyz[_within(xyz, area) | balls.hold(cloud)]
         if tile.is_tree:
             return self.read(number, area).xyz
-        xyz = np.load(self.borders[number])
+        try:
+            xyz = np.load(self.borders[number])
+        except FileNotFoundError:
+            # Its task has failed, or the share does not show the file to this machine yet.
+            xyz = self.read(number).xyz
         return np.asarray(xyz[_within(xyz, area)], dtype=np.float64)
 
 

@@ -14,11 +14,11 @@ import numpy as np
 from . import _core
 from ._camera import Axes, Camera, Size, View
 from ._cloud import Cloud
-from ._errors import EmptyError, Error
+from ._errors import EmptyError
 from ._files import shown
 from ._play import Recording, play
 from ._render import Renderer
-from ._task import Task, unfinished
+from ._task import Task, unfinished, unseen
 
 #: Most frames that the camera is placed by, and fewest points that it can be placed by.
 _LOOKS, _LEAST = 5, 2
@@ -120,7 +120,7 @@ class FramesTask(Task):
     def run(self, device: int | str | None) -> tuple[int, int]:
         pictures = self.pictures
         if not os.path.exists(self.settled):
-            raise Error(f"{self.settled} is missing: what pictures share could not be settled")
+            raise unseen(self.settled, "what pictures share is not settled")
         settled = json.loads(Path(self.settled).read_text(encoding="utf-8"))
         look = {**pictures.look, "exposure": settled["exposure"], "value_range": settled["value_range"]}
         points = pictures.open()

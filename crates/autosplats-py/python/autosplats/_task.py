@@ -120,11 +120,9 @@ def run_task(task: Task, *, device: int | str | None = None, version: str = _cor
         with _listening(notes):
             points, in_doubt = task.run(device)
         size = sum(os.path.getsize(path) for path in task.outputs() if os.path.exists(path))
-    except OSError as failure:
-        if failure.errno in _FLAKY:
-            raise
-        error = told(failure)
     except Exception as failure:
+        if is_flaky(failure):
+            raise
         error = told(failure)
     return Row(
         task=task.name,
@@ -137,6 +135,16 @@ def run_task(task: Task, *, device: int | str | None = None, version: str = _cor
         notes=tuple(notes),
         error=error,
     )
+
+
+def is_flaky(failure: BaseException) -> bool:
+    """Whether another try may succeed."""
+    return isinstance(failure, OSError) and failure.errno in _FLAKY
+
+
+def unseen(path: str, why: str) -> OSError:
+    """An error for a file of an earlier step that is not there. Shares may show it to this machine later."""
+    return OSError(errno.ESTALE, why, path)
 
 
 def told(failure: BaseException) -> str:

@@ -18,7 +18,7 @@ from ._cloud import Cloud
 from ._errors import Error
 from ._files import write
 from ._normals import Normals
-from ._task import Task, unfinished
+from ._task import Task, unfinished, unseen
 from ._tiles import Doubles, Tile
 
 #: Rounding must not hide a neighbour.
@@ -215,7 +215,7 @@ class CopcTask(Task):
         clouds = []
         for tile, listed in self.parts:
             if not os.path.exists(listed):
-                raise Error(f"{tile} cannot be read, which has points here; repair or remove it")
+                raise unseen(tile, "its points are missing; repair or remove it")
             part = json.loads(Path(listed).read_text(encoding="utf-8")).get(self.cell)
             if part is not None:
                 clouds.append(Index([Tile("", part, "")], [0.0], [""], None).read(0))
