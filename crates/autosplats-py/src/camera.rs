@@ -105,6 +105,12 @@ pub(crate) fn fit_camera(
     written(&run(py, None, None, |_| fit.place(&shown(&cloud.cloud, axes), size))?)
 }
 
+/// The axes that a cloud states, or those that it seems to have.
+#[pyfunction]
+pub(crate) fn axes_of(py: Python<'_>, cloud: &Cloud) -> PyResult<&'static str> {
+    run(py, None, None, |_| Ok(guess_axes(&shown(&cloud.cloud, None)).name()))
+}
+
 /// Raises unless the camera is valid.
 #[pyfunction]
 pub(crate) fn check_camera(camera: &str) -> PyResult<()> {

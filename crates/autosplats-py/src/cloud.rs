@@ -5,14 +5,15 @@ use std::sync::Arc;
 use autosplats::Camera;
 use autosplats_cloud::glam::{DMat4, DVec3};
 use autosplats_cloud::{Axes, Crs, PointCloud, Scan, each_type};
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rayon::prelude::*;
 
 use crate::convert;
 use crate::errors::{self, Class, Failure};
 use crate::view::view;
-use crate::wait::run;
+use crate::wait::{Watch, run};
 
 /// Points and their attributes.
 #[pyclass(frozen, module = "autosplats._core")]
@@ -204,6 +205,24 @@ impl Cloud {
         Ok(self.changed(kept))
     }
 
+    /// Which points lie within `radii` (m) of `centers` (m, 3), world coordinates, spheres included.
+    fn near<'py>(
+        &self,
+        py: Python<'py>,
+        centers: PyReadonlyArray2<'_, f64>,
+        radii: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let centers = centers.as_array();
+        let balls: Vec<(DVec3, f64)> = centers
+            .rows()
+            .into_iter()
+            .zip(radii.as_array())
+            .map(|(center, &radius)| (DVec3::new(center[0], center[1], center[2]), radius))
+            .collect();
+        let near = run(py, None, None, |watch| near(&self.cloud, &balls, watch))?;
+        Ok(PyArray1::from_vec(py, near))
+    }
+
     /// One point per occupied cube.
     fn thinned(
         &self,
@@ -243,6 +262,30 @@ impl Cloud {
     fn nbytes(&self) -> usize {
         self.cloud.byte_len()
     }
+}
+
+/// Points that are compared with the same balls. Neighbours in a file are mostly neighbours in space.
+const PIECE: usize = 1 << 10;
+
+/// Which points lie in one of some balls. Pieces of the cloud are compared with the balls that meet their boxes.
+fn near(cloud: &PointCloud, balls: &[(DVec3, f64)], watch: &Watch) -> Result<Vec<bool>, Failure> {
+    let mut near = vec![false; cloud.len()];
+    near.par_chunks_mut(PIECE).enumerate().try_for_each(|(piece, near)| {
+        if !watch.goes_on() {
+            return Err(Failure::Cancelled);
+        }
+        let points: Vec<DVec3> = (0..near.len()).map(|i| cloud.world_position(piece * PIECE + i)).collect();
+        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let [low, high] = points.iter().fold(none, |[low, high], point| [low.min(*point), high.max(*point)]);
+        let distance = |from: DVec3, to: DVec3| from.distance_squared(to);
+        let meets = |(center, radius): &&(DVec3, f64)| distance(*center, center.clamp(low, high)) <= radius * radius;
+        let balls: Vec<&(DVec3, f64)> = balls.iter().filter(meets).collect();
+        for (near, point) in near.iter_mut().zip(points) {
+            *near = balls.iter().any(|(center, radius)| distance(*center, point) <= radius * radius);
+        }
+        Ok(())
+    })?;
+    Ok(near)
 }
 
 /// Adds attributes to positions.

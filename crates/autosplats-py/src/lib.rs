@@ -15,6 +15,7 @@ mod play;
 mod pool;
 mod read;
 mod render;
+mod tree;
 mod view;
 mod wait;
 
@@ -22,7 +23,7 @@ mod wait;
 #[pyo3::pymodule(gil_used = false)]
 mod _core {
     #[pymodule_export]
-    use crate::camera::{check_camera, fit_camera, project, unproject};
+    use crate::camera::{axes_of, check_camera, fit_camera, project, unproject};
     #[pymodule_export]
     use crate::cloud::Cloud;
     #[pymodule_export]
@@ -39,6 +40,8 @@ mod _core {
     use crate::read::{read_bytes, read_source, write};
     #[pymodule_export]
     use crate::render::{Renderer, devices};
+    #[pymodule_export]
+    use crate::tree::{outline, tree_nodes};
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -4,10 +4,11 @@ use std::ffi::c_int;
 use std::path::PathBuf;
 
 use autosplats::{Camera, Projection};
-use autosplats_cloud::{Error, PointFilter};
-use autosplats_formats::{ReadOptions, check_writable};
+use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::{Error, PointCloud, PointFilter, Progress};
+use autosplats_formats::{Part, ReadOptions, check_writable};
 use autosplats_scenes::View;
-use autosplats_sources::Source;
+use autosplats_sources::{Source, read_tree};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 
@@ -27,19 +28,26 @@ pub(crate) struct Reading {
     keep: Option<String>,
     keep_no_returns: bool,
     headers: Vec<String>,
+    bounds: Option<[[f64; 3]; 2]>,
 }
 
 impl Reading {
+    /// Corners of the box that points are read of.
+    fn bounds(&self) -> Option<[DVec3; 2]> {
+        self.bounds.map(|corners| corners.map(DVec3::from))
+    }
+
     /// The options for the libraries.
     pub(crate) fn options(self) -> PyResult<ReadOptions> {
-        let Self { exact, columns, keep, keep_no_returns, headers } = self;
+        let Self { exact, columns, keep, keep_no_returns, headers, bounds: _ } = self;
         let keep = keep.map(|words| words.parse::<PointFilter>()).transpose();
         let keep = keep.map_err(|error| Failure::Cloud(error).raise())?;
         Ok(ReadOptions { exact, columns, keep, keep_no_returns, headers, ..ReadOptions::default() })
     }
 }
 
-/// Reads a source by its name: a file, a folder, an address or a scene.
+/// Reads a source by its name: a file, a folder, an address or a scene. Of bounds, octrees read the nodes that they
+/// need.
 #[pyfunction]
 pub(crate) fn read_source(
     py: Python<'_>,
@@ -48,11 +56,15 @@ pub(crate) fn read_source(
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Cloud> {
+    let bounds = options.bounds();
     let options = options.options()?;
     let (cloud, camera) = run(py, threads, progress, |watch| {
         let source = Source::parse(name)?;
         autosplats_cloud::check_memory("the points of the scene", source.least_bytes())?;
-        let cloud = source.read(&options, watch)?;
+        let cloud = match bounds {
+            Some(bounds) => within(&source, bounds, &options, watch)?,
+            None => source.read(&options, watch)?,
+        };
         let camera = match &source {
             Source::Scene(scene, _) => {
                 let View { eye, look_at, up, fov_degrees } = scene.view();
@@ -75,9 +87,29 @@ pub(crate) fn read_bytes(
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Cloud> {
+    let bounds = options.bounds();
     let options = options.options()?;
-    let cloud = run(py, threads, progress, |watch| Ok(autosplats_formats::read_bytes(&name, bytes, &options, watch)?))?;
+    let cloud = run(py, threads, progress, |watch| {
+        let mut cloud = autosplats_formats::read_bytes(&name, bytes, &options, watch)?;
+        bounds.iter().for_each(|&[low, high]| cloud.crop(low, high));
+        Ok(cloud)
+    })?;
     Ok(cloud.into())
+}
+
+/// The points of a source inside a box.
+fn within(
+    source: &Source,
+    [low, high]: [DVec3; 2],
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<PointCloud, Error> {
+    if let Some(tree) = source.open_tree(options, progress)? {
+        return read_tree(&*tree, &Part { bounds: Some([low, high]), ..Part::default() }, options, progress);
+    }
+    let mut cloud = source.read(options, progress)?;
+    cloud.crop(low, high);
+    Ok(cloud)
 }
 
 /// Writes a cloud in the format of the path's extension. The file appears whole or not at all.

@@ -72,15 +72,8 @@ impl Renderer {
         threads: Option<usize>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Frame> {
-        if self.process.is_some_and(|process| process != std::process::id()) {
-            let what = "this renderer's device belongs to the process that was forked; make a renderer in each process";
-            return Err(errors::raise(Class::Device, what.into()));
-        }
-        let mut settings: Settings = serde_json::from_str(settings)
-            .map_err(|error| errors::raise(Class::Argument, format!("settings: {error}")))?;
-        settings.shading.color =
-            color.parse().map_err(|error| errors::raise(Class::Argument, format!("color is '{color}', {error}")))?;
-        settings.check().map_err(|error| Failure::Render(error).raise())?;
+        self.check_process()?;
+        let settings = checked(settings, color)?;
         let axes = axes.map(named_axes).transpose()?;
         let camera = camera.map(parsed).transpose()?;
         let fit = Fit { own: cloud.camera, view: direction(view)?, axes, fov: None, orthographic: false };
@@ -105,9 +98,54 @@ impl Renderer {
             }
         })
     }
+
+    /// Fixes what pictures of moving points share, by the first of them, rendered with `size` (width, height) pixels:
+    /// the exposure, and the values at both ends of the colour map, if colours show values.
+    #[pyo3(signature = (cloud, camera, axes, size, settings, color))]
+    #[allow(clippy::too_many_arguments, reason = "only the package's own Python calls it")]
+    fn settle(
+        &self,
+        py: Python<'_>,
+        cloud: &Cloud,
+        camera: &str,
+        axes: Option<&str>,
+        size: [u32; 2],
+        settings: &str,
+        color: &str,
+    ) -> PyResult<(Option<f32>, Option<[f64; 2]>)> {
+        self.check_process()?;
+        let settings = checked(settings, color)?;
+        let axes = axes.map(named_axes).transpose()?;
+        let camera = parsed(camera)?;
+        run(py, None, None, |watch| {
+            let cloud = shown(&cloud.cloud, axes);
+            let mut settings = settings.for_points(&cloud);
+            self.turn(watch)?.settle(&mut settings, &*cloud, &camera, size, &|| watch.goes_on())?;
+            Ok((settings.shading.exposure, settings.shading.range))
+        })
+    }
+}
+
+/// Settings of a text, with the colour mode of this name.
+fn checked(settings: &str, color: &str) -> PyResult<Settings> {
+    let mut settings: Settings =
+        serde_json::from_str(settings).map_err(|error| errors::raise(Class::Argument, format!("settings: {error}")))?;
+    settings.shading.color =
+        color.parse().map_err(|error| errors::raise(Class::Argument, format!("color is '{color}', {error}")))?;
+    settings.check().map_err(|error| Failure::Render(error).raise())?;
+    Ok(settings)
 }
 
 impl Renderer {
+    /// Fails if the device belongs to another process.
+    fn check_process(&self) -> PyResult<()> {
+        if self.process.is_none_or(|process| process == std::process::id()) {
+            return Ok(());
+        }
+        let what = "this renderer's device belongs to the process that was forked; make a renderer in each process";
+        Err(errors::raise(Class::Device, what.into()))
+    }
+
     /// Waits until no other thread uses the renderer.
     fn turn(&self, watch: &Watch) -> Result<MutexGuard<'_, autosplats::Renderer>, Failure> {
         loop {

@@ -122,3 +122,21 @@ def test_degrees_are_shown_in_metres(tmp_path):
     assert cloud.crs.unit == "degree"
     normals = autosplats.estimate_normals(cloud, orient="up").normals
     assert np.median(normals[:, 2]) > 0.95, "flat in metres"
+
+
+def test_bounds_of_files_and_octrees(tmp_path):
+    points = np.random.default_rng(5).random((60_000, 3)) * [200, 200, 10]
+    points[7] = [50, 60, 5]
+    for name in ("a.laz", "a.copc.laz", "a.xyz"):
+        autosplats.write(autosplats.Cloud(points), tmp_path / name)
+        whole = autosplats.read(tmp_path / name).xyz
+        for low, high in [([50, 60, 2], [90, 70, 5]), ([-np.inf, 60, -np.inf], [90, np.inf, np.inf]), ([300] * 3, [301] * 3)]:
+            inside = whole[((whole >= low) & (whole <= high)).all(axis=1)]
+            found = autosplats.read(tmp_path / name, bounds=[low, high]).xyz
+            assert len(found) == len(inside)
+            # Readers of octrees choose another origin for a part.
+            np.testing.assert_allclose(np.sort(found, axis=0), np.sort(inside, axis=0), rtol=0, atol=1e-6)
+        assert len(autosplats.read((tmp_path / name).read_bytes(), bounds=[[0, 0, 0], [90, 90, 5]])) < 30_000
+    for bounds in ([0, 1], [[1, 1, 1], [0, 2, 2]], [[np.nan, 0, 0], [1, 1, 1]]):
+        with pytest.raises(autosplats.ArgumentError, match="bounds"):
+            autosplats.read(tmp_path / "a.laz", bounds=bounds)

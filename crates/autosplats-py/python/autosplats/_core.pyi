@@ -6,7 +6,30 @@ from typing import Any, final
 import numpy as np
 import numpy.typing as npt
 
-__all__: list[str]
+__all__ = [
+    "Cloud",
+    "Frame",
+    "Recording",
+    "Renderer",
+    "VERSION",
+    "axes_of",
+    "check_camera",
+    "command",
+    "devices",
+    "encode_picture",
+    "estimate_normals",
+    "fit_camera",
+    "main",
+    "num_threads",
+    "outline",
+    "project",
+    "read_bytes",
+    "read_source",
+    "set_num_threads",
+    "tree_nodes",
+    "unproject",
+    "write",
+]
 VERSION: str
 
 _Floats = npt.NDArray[np.float32]
@@ -63,6 +86,7 @@ class Cloud:
     def crs(self) -> tuple[str | None, int | None, str | None, str | None]: ...
     def bounds(self) -> list[list[float]] | None: ...
     def masked(self, mask: npt.NDArray[np.bool_]) -> Cloud: ...
+    def near(self, centers: _Doubles, radii: _Doubles) -> npt.NDArray[np.bool_]: ...
     def thinned(self, voxel: float, threads: int | None, progress: _Report) -> Cloud: ...
     def with_field(self, name: str, values: npt.NDArray[Any]) -> Cloud: ...
     @property
@@ -116,6 +140,9 @@ class Renderer:
         threads: int | None,
         progress: _Report,
     ) -> Frame: ...
+    def settle(
+        self, cloud: Cloud, camera: str, axes: str | None, size: _Size, settings: str, color: str
+    ) -> tuple[float | None, list[float] | None]: ...
 
 @final
 class Recording:
@@ -147,13 +174,16 @@ def estimate_normals(
 def fit_camera(
     cloud: Cloud, view: str, size: _Size, axes: str | None, fov: float | None, orthographic: bool
 ) -> str: ...
+def axes_of(cloud: Cloud) -> str: ...
 def main(arguments: Sequence[str]) -> int: ...
 def num_threads() -> int: ...
+def outline(name: str) -> dict[str, Any]: ...
 def project(camera: str, size: _Size, points: _Doubles) -> tuple[_Doubles, _Doubles]: ...
 def read_bytes(
     bytes: bytes, name: str, options: dict[str, Any], threads: int | None, progress: _Report
 ) -> Cloud: ...
 def read_source(name: str, options: dict[str, Any], threads: int | None, progress: _Report) -> Cloud: ...
 def set_num_threads(threads: int | None) -> None: ...
+def tree_nodes(name: str) -> tuple[_Doubles, _Doubles, npt.NDArray[np.uint64], npt.NDArray[np.uint64]] | None: ...
 def unproject(camera: str, size: _Size, pixels: _Doubles, depths: _Doubles) -> _Doubles: ...
 def write(cloud: Cloud, path: str, overwrite: bool, threads: int | None, progress: _Report) -> None: ...

@@ -7,8 +7,11 @@ import os
 from collections.abc import Sequence
 from typing import Any, Protocol, Union
 
+import numpy.typing as npt
+
 from . import _core
 from ._cloud import Cloud, core_cloud
+from ._convert import numbers
 from ._errors import ArgumentError, FormatError
 from ._progress import ProgressLike, reporting
 from ._threads import checked
@@ -34,6 +37,7 @@ def reading(
     keep: str | None = None,
     keep_no_returns: bool = False,
     headers: Sequence[str] = (),
+    bounds: npt.ArrayLike | None = None,
 ) -> dict[str, Any]:
     """Options of reading for the native half."""
     if isinstance(columns, str):
@@ -44,7 +48,18 @@ def reading(
         "keep": keep,
         "keep_no_returns": keep_no_returns,
         "headers": list(headers),
+        "bounds": None if bounds is None else _box(bounds),
     }
+
+
+def _box(bounds: npt.ArrayLike) -> list[list[float]]:
+    corners = numbers(bounds, "bounds")
+    if corners.shape != (2, 3):
+        raise ArgumentError(f"bounds: an array of shape {corners.shape} given, (2, 3) is wanted")
+    if not (corners[0] <= corners[1]).all():
+        raise ArgumentError("bounds: the least coordinates come first, and none may be NaN")
+    box: list[list[float]] = corners.tolist()
+    return box
 
 
 def shown(source: Source) -> _core.Cloud:
@@ -56,6 +71,7 @@ def read(
     source: Source | bytes | Readable,
     *,
     name: str | None = None,
+    bounds: npt.ArrayLike | None = None,
     columns: Sequence[str] | None = None,
     keep: str | None = None,
     keep_no_returns: bool = False,
@@ -70,6 +86,8 @@ def read(
         source: A file of any format, recognised by its content; its bytes, or an open binary file; an http, https, s3,
             gs or az address; a folder of files or a recording, whose first frame is read; or "scene:NAME:COUNT".
         name: With bytes, a name that helps to recognise the format, as "scan.xyz" does.
+        bounds: Least and largest world coordinates (2, 3) of the points to read, both included; infinite where there is
+            no limit. Of octrees (COPC, EPT) only the nodes there are read, of other files all.
         columns: Names of the columns of text and of binary records without a header: x, y, z, red, Intensity ...; "-"
             leaves a column out.
         keep: Which points to keep, such as "ground", "first" or "2..5", as the command's --keep.
@@ -87,7 +105,9 @@ def read(
         ArgumentError: If an option or the name of a scene is wrong.
         OutOfMemoryError: If the points do not fit into memory.
     """
-    options = reading(exact=exact, columns=columns, keep=keep, keep_no_returns=keep_no_returns, headers=headers)
+    options = reading(
+        exact=exact, columns=columns, keep=keep, keep_no_returns=keep_no_returns, headers=headers, bounds=bounds
+    )
     threads = checked(num_threads)
     with reporting(progress, "reading") as report:
         if isinstance(source, (str, os.PathLike)):

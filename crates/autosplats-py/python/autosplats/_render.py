@@ -122,30 +122,20 @@ class Renderer:
             raise ArgumentError(f"supersample is {supersample}, must be within 1 to 16")
         if layers and supersample not in (None, 1):
             raise ArgumentError("supersample: layers cannot be averaged; render them without")
-        if color_map is not None and color_map not in _COLOR_MAPS:
-            raise ArgumentError(f"color_map is '{color_map}', must be one of {', '.join(_COLOR_MAPS)}")
-        if not isinstance(color, str):
-            what = "the name of a mode or a field is wanted; colours of points are colors="
-            raise TypeError(f"color: {type(color).__name__} given, {what}")
-        reconstruction: dict[str, object] = {}
-        if k != "auto":
-            if isinstance(k, (bool, str)) or not hasattr(k, "__index__"):
-                raise TypeError(f"k: {k!r} given, a whole number or 'auto' is wanted")
-            reconstruction.update(k=k.__index__(), adaptive=False)
-        if keep_outliers:
-            reconstruction["outlier_expansions"] = None
-        reconstruction.update(settings or {})
-        shading: dict[str, object] = {
-            "range": None if value_range is None else [float(end) for end in value_range],
-            "color_map": color_map,
-            "legend": bool(legend),
-            "lighting": bool(lighting),
-            "exposure": None if exposure is None else float(exposure),
-            "occlusion": float(occlusion),
-        }
-        if background is not None:
-            shading["background"] = background
-        whole = {"reconstruction": reconstruction, "shading": shading, "all_layers": bool(layers)}
+        whole = _settings(
+            color=color,
+            value_range=value_range,
+            color_map=color_map,
+            legend=legend,
+            background=background,
+            lighting=lighting,
+            exposure=exposure,
+            occlusion=occlusion,
+            k=k,
+            keep_outliers=keep_outliers,
+            settings=settings,
+            layers=layers,
+        )
         with reporting(progress, "rendering") as report:
             frame = self._core.render(
                 core,
@@ -153,7 +143,7 @@ class Renderer:
                 view,
                 axes,
                 size,
-                json.dumps(whole),
+                whole,
                 color,
                 None if supersample is None else supersample.__index__(),
                 checked(num_threads),
@@ -161,12 +151,65 @@ class Renderer:
             )
         return Picture(frame)
 
+    def _settled(
+        self, points: Cloud, camera: Camera, size: Size, axes: str | None, look: Mapping[str, Any]
+    ) -> tuple[float | None, list[float] | None]:
+        """The exposure and the value range that suit a picture, for all pictures of a job. `look` has arguments of
+        `render`; what they state is returned. The range is None if colours show no values."""
+        arguments = dict(look)
+        factor = arguments.pop("supersample", None) or 1
+        rendered = (factor * size[0], factor * size[1])
+        color = arguments.get("color", "auto")
+        return self._core.settle(points._core, camera.to_json(), axes, rendered, _settings(**arguments), color)
+
     def __reduce__(self) -> tuple[Any, ...]:
         return _unpickled, self._asked
 
     def __repr__(self) -> str:
         device = self.device
         return f"<autosplats.Renderer on {'the processor' if device is None else device.name}>"
+
+
+def _settings(
+    *,
+    color: object = "auto",
+    value_range: tuple[float, float] | None = None,
+    color_map: ColorMap | None = None,
+    legend: bool = False,
+    background: str | None = None,
+    lighting: bool = True,
+    exposure: float | None = None,
+    occlusion: float = 1.0,
+    k: int | Literal["auto"] = "auto",
+    keep_outliers: bool = False,
+    settings: Mapping[str, object] | None = None,
+    layers: bool = False,
+) -> str:
+    """The settings of a picture, but for the colour mode, as JSON."""
+    if color_map is not None and color_map not in _COLOR_MAPS:
+        raise ArgumentError(f"color_map is '{color_map}', must be one of {', '.join(_COLOR_MAPS)}")
+    if not isinstance(color, str):
+        what = "the name of a mode or a field is wanted; colours of points are colors="
+        raise TypeError(f"color: {type(color).__name__} given, {what}")
+    reconstruction: dict[str, object] = {}
+    if k != "auto":
+        if isinstance(k, (bool, str)) or not hasattr(k, "__index__"):
+            raise TypeError(f"k: {k!r} given, a whole number or 'auto' is wanted")
+        reconstruction.update(k=k.__index__(), adaptive=False)
+    if keep_outliers:
+        reconstruction["outlier_expansions"] = None
+    reconstruction.update(settings or {})
+    shading: dict[str, object] = {
+        "range": None if value_range is None else [float(end) for end in value_range],
+        "color_map": color_map,
+        "legend": bool(legend),
+        "lighting": bool(lighting),
+        "exposure": None if exposure is None else float(exposure),
+        "occlusion": float(occlusion),
+    }
+    if background is not None:
+        shading["background"] = background
+    return json.dumps({"reconstruction": reconstruction, "shading": shading, "all_layers": bool(layers)})
 
 
 def _unpickled(backend: Backend, device: int | str | None) -> Renderer:

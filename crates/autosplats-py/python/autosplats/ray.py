@@ -1,0 +1,265 @@
+"""Jobs on many machines, by Ray: `pip install autosplats[ray]`.
+
+>>> from autosplats import jobs, ray
+>>> job = jobs.tile_normals("tiles/*.laz", "normals")          # doctest: +SKIP
+>>> ray.run(job, address="auto").raise_if_failed()             # doctest: +SKIP
+
+or, from the shell, `python -m autosplats.ray normals 'tiles/*.laz' -o normals --address auto`.
+
+All machines need the same paths, by a shared file system, and this package in the same version.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import _core
+from ._errors import ArgumentError, Error
+from ._job import Job, Progress, Report, Run, failed
+from ._task import Row, Task, run_task
+
+#: Tasks that wait for each that can run at once, so that no machine waits for the driver.
+_AHEAD = 2
+#: Seconds of waiting between two looks at stragglers and at the size of the cluster.
+_STEP = 1.0
+#: How many times as long as others a task takes before it is started once more, and at least how many seconds.
+_SLOW, _SLOW_SECONDS = 3.0, 10.0
+#: Fewest finished tasks that tell how long others take.
+_KNOWN = 3
+#: Seconds in which cancelled tasks are waited for.
+_END = 5.0
+
+
+def run(
+    job: Job,
+    *,
+    address: str | None = None,
+    num_cpus: float = 2,
+    num_gpus: float = 0,
+    memory: int | None = None,
+    retries: int = 3,
+    speculate: bool = True,
+    progress: Progress = None,
+) -> Report:
+    """Runs a job on a cluster of Ray.
+
+    A task is tried again if its worker or its machine is lost, or if a file cannot be read or written for now; not if a
+    file is malformed. A task that takes much longer than others is started a second time when all else is done; the
+    first to finish counts, which is the same. Ctrl-C cancels all tasks and keeps what is done.
+
+    Args:
+        job: The job.
+        address: Of the cluster: "auto" for the one that this machine belongs to, or "HOST:PORT". By default the cluster
+            that this process is connected to, that of the variable RAY_ADDRESS, or else this machine alone.
+        num_cpus: Processor cores per task, and its threads.
+        num_gpus: Graphics cards per task; parts are allowed. Pictures are then rendered on the card that Ray assigns.
+        memory: Memory per task in bytes; by default by the number of its points.
+        retries: How often a task is tried again.
+        speculate: Whether slow tasks are started a second time.
+        progress: True for a line on standard error, or a function of the finished fraction.
+
+    Raises:
+        ArgumentError: If there are outputs of other settings, or of unknown ones.
+        ImportError: If Ray is not installed.
+        ConnectionError: If there is no cluster at the address.
+    """
+    ray = _ray()
+    ours = not ray.is_initialized()
+    if not ours and address is not None:
+        raise ArgumentError(f"address is '{address}', but this process is connected to a cluster already; leave it out")
+    with job.begin(progress) as started:
+        steps = list(started.steps())
+        if not steps:
+            return started.report()
+        if ours:
+            _connect(ray, address)
+        try:
+            if ours and address is None:
+                # This machine may have fewer, and no other will come.
+                num_cpus = min(num_cpus, ray.cluster_resources().get("CPU", num_cpus))
+            engine = _Engine(ray, started, num_cpus, num_gpus, memory, retries, speculate)
+            for tasks in steps:
+                engine.perform(tasks)
+        finally:
+            if ours:
+                ray.shutdown()
+    return started.report()
+
+
+def _ray() -> Any:
+    try:
+        import ray
+    except ImportError as error:
+        raise ImportError("Ray is not installed; pip install autosplats[ray], or run the job by job.run()") from error
+    return ray
+
+
+def _connect(ray: Any, address: str | None) -> None:
+    options: dict[str, Any] = {"logging_level": "ERROR", "log_to_driver": False}
+    if address is None and not os.environ.get("RAY_ADDRESS"):
+        # A cluster of this machine, without what a person would look at.
+        options |= {"include_dashboard": False, "object_store_memory": 100 << 20}
+    ray.init(address=address, **options)
+
+
+@dataclass
+class _Running:
+    """A task that is handed out."""
+
+    task: Task
+    #: When it has begun, as far as is known: when there was room for it.
+    begun: float | None = None
+    copies: list[Any] = field(default_factory=list)
+
+
+class _Engine:
+    """Hands out tasks, a few more than run at once."""
+
+    def __init__(
+        self,
+        ray: Any,
+        started: Run,
+        num_cpus: float,
+        num_gpus: float,
+        memory: int | None,
+        retries: int,
+        speculate: bool,
+    ) -> None:
+        self._ray, self._run, self._speculate = ray, started, speculate
+        self._memory = memory
+        #: What a task takes, by Ray's names.
+        self._wanted = {"num_cpus": num_cpus, "num_gpus": num_gpus}
+        self._remote = ray.remote(max_retries=retries, retry_exceptions=[OSError])(_on_worker)
+        #: Seconds per effort of finished tasks.
+        self._paces: list[float] = []
+        self._nodes: list[dict[str, float]] = []
+
+    def perform(self, tasks: Sequence[Task]) -> None:
+        """Performs all tasks of a step."""
+        ray = self._ray
+        waiting = list(reversed(tasks))
+        running: dict[str, _Running] = {}
+        of_copy: dict[Any, str] = {}
+        self._paces.clear()
+
+        def start(one: _Running) -> None:
+            options = {**self._wanted, "memory": self._bytes(one.task)}
+            copy = self._remote.options(**options).remote(one.task, _core.VERSION)
+            one.copies.append(copy)
+            of_copy[copy] = one.task.name
+
+        try:
+            while waiting or running:
+                self._nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
+                slots = self._slots()
+                while waiting and len(running) < _AHEAD * slots:
+                    one = _Running(waiting.pop())
+                    running[one.task.name] = one
+                    start(one)
+                now = time.monotonic()
+                for one in list(running.values())[:slots]:
+                    one.begun = one.begun or now
+                free = slots - len(of_copy)
+                if self._speculate and not waiting and free > 0:
+                    for one in self._slow(running.values(), now)[:free]:
+                        start(one)
+                finished, _ = ray.wait(list(of_copy), num_returns=1, timeout=_STEP)
+                for copy in finished:
+                    name = of_copy.pop(copy)
+                    one = running[name]
+                    one.copies.remove(copy)
+                    row = self._row(one, copy)
+                    if row is None:
+                        continue
+                    del running[name]
+                    for other in one.copies:
+                        of_copy.pop(other)
+                    self._cancel(one.copies)
+                    self._run.add(row)
+        except BaseException:
+            self._cancel(list(of_copy))
+            raise
+
+    def _row(self, one: _Running, copy: Any) -> Row | None:
+        """What has become of a task, by one of its copies; None if another may still do it."""
+        try:
+            row: Row = self._ray.get(copy)
+        except self._ray.exceptions.RayError as error:
+            if one.copies:
+                return None
+            return failed(one.task, _cause(error))
+        self._paces.append(row.seconds / (one.task.points + 1))
+        return row
+
+    def _cancel(self, copies: Sequence[Any]) -> None:
+        """Ends tasks, and waits until they have ended, since they write files."""
+        for copy in copies:
+            self._ray.cancel(copy, force=True)
+        if copies:
+            self._ray.wait(list(copies), num_returns=len(copies), timeout=_END)
+
+    def _slots(self) -> int:
+        """How many tasks can run at once."""
+        names = {"CPU": self._wanted["num_cpus"], "GPU": self._wanted["num_gpus"]}
+
+        def of_node(node: dict[str, float]) -> int:
+            return min(int(node.get(name, 0) / count) for name, count in names.items() if count > 0)
+
+        return max(sum(map(of_node, self._nodes)), 1)
+
+    def _bytes(self, task: Task) -> int:
+        """Memory to ask for: no more than the largest machine has, else the task would wait for ever."""
+        most = max((int(node.get("memory", 0)) for node in self._nodes), default=0)
+        return min(task.memory if self._memory is None else self._memory, most)
+
+    def _slow(self, running: Any, now: float) -> list[_Running]:
+        """Tasks with one copy that takes much longer than others, the slowest first."""
+        if len(self._paces) < _KNOWN:
+            return []
+        pace = statistics.median(self._paces)
+
+        def lateness(one: _Running) -> float:
+            usual = max(_SLOW * pace * (one.task.points + 1), _SLOW_SECONDS)
+            return 0.0 if one.begun is None else (now - one.begun) / usual
+
+        late = [one for one in running if len(one.copies) == 1 and lateness(one) > 1]
+        return sorted(late, key=lateness, reverse=True)
+
+
+def _on_worker(task: Task, version: str) -> Row:
+    """Performs a task in a worker of Ray, which states the number of threads by a variable of its own."""
+    import ray
+
+    cards = ray.get_gpu_ids()
+    return run_task(task, device=_device(int(cards[0])) if cards else None, version=version)
+
+
+def _device(card: int) -> str | int:
+    """The graphics device that is a card of Ray's count: by place on the bus, as drivers count cards of one kind."""
+    from ._render import devices
+
+    found = sorted((device.pci_bus_id, device.number) for device in devices() if not device.software)
+    if card >= len(found):
+        raise Error(f"Ray assigns graphics card {card}, but this machine shows {len(found)}")
+    return found[card][1]
+
+
+def _cause(error: BaseException) -> BaseException:
+    """The task's own exception, if there is one."""
+    cause = getattr(error, "cause", None)
+    if isinstance(cause, BaseException):
+        return cause
+    first = str(error).strip().splitlines()
+    return Error(f"the worker was lost, and so were its retries ({type(error).__name__}: {first[0] if first else ''})")
+
+
+if __name__ == "__main__":
+    from ._jobs_command import main
+
+    sys.exit(main("ray"))
