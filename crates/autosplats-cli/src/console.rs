@@ -130,11 +130,35 @@ impl Console {
         self.message(format_args!("error: {error}"));
     }
 
-    /// Tells people something.
+    /// Tells people why the command ends, unless somebody else does or there is nothing to say.
+    pub(crate) fn last_error(&self, error: &str) {
+        if self.interrupt.tell_end() && !error.is_empty() {
+            self.put(&format!("error: {error}\n"));
+        }
+    }
+
+    /// Tells people that a signal ends the process.
+    pub(crate) fn ended(&self, exit: Exit) {
+        // The line feed leaves the cursor's line, where the terminal shows ^C and perhaps a progress bar.
+        let begin = if self.messages_to_terminal() { "\n" } else { "" };
+        let what = match exit {
+            Exit::HungUp => "hung up",
+            Exit::Terminated => "terminated",
+            _ => "interrupted",
+        };
+        self.put(&format!("{begin}error: {what}\n"));
+    }
+
+    /// Tells people something, unless the last message has been printed.
     pub(crate) fn message(&self, message: impl Display) {
-        let line = format!("{message}\n");
+        if !self.interrupt.is_told() {
+            self.put(&format!("{message}\n"));
+        }
+    }
+
+    fn put(&self, lines: &str) {
         // A message that cannot be printed cannot be complained about either.
-        let _ = self.streams.messages.lock().unwrap_or_else(PoisonError::into_inner).write_all(line.as_bytes());
+        let _ = self.streams.messages.lock().unwrap_or_else(PoisonError::into_inner).write_all(lines.as_bytes());
     }
 }
 

@@ -121,7 +121,7 @@ pub(super) fn run(
         for (number, frame) in frames.clone().enumerate() {
             bar.tick(number as f32 / frames.len() as f32)?;
             let picture = film.file(frame);
-            if film.resume && picture.as_ref().is_some_and(|picture| picture.exists()) {
+            if film.resume && picture.as_deref().is_some_and(is_written) {
                 tally.kept += 1;
                 continue;
             }
