@@ -133,7 +133,7 @@ impl Console {
     /// Tells people why the command ends, unless somebody else does or there is nothing to say.
     pub(crate) fn last_error(&self, error: &str) {
         if self.interrupt.tell_end() && !error.is_empty() {
-            self.put(&format!("error: {error}\n"));
+            self.put(&format!("error: {error}"));
         }
     }
 
@@ -146,20 +146,40 @@ impl Console {
             Exit::Terminated => "terminated",
             _ => "interrupted",
         };
-        self.put(&format!("{begin}error: {what}\n"));
+        self.put(&format!("{begin}error: {what}"));
     }
 
     /// Tells people something, unless the last message has been printed.
     pub(crate) fn message(&self, message: impl Display) {
         if !self.interrupt.is_told() {
-            self.put(&format!("{message}\n"));
+            self.put(&message.to_string());
         }
     }
 
     fn put(&self, lines: &str) {
+        let lines: String = lines.split('\n').map(|line| shown(line) + "\n").collect();
         // A message that cannot be printed cannot be complained about either.
         let _ = self.streams.messages.lock().unwrap_or_else(PoisonError::into_inner).write_all(lines.as_bytes());
     }
+}
+
+/// Longest line of a message, in characters. Messages quote names and files, which may be of any length.
+const MAX_LINE: usize = 4096;
+
+/// A line for a terminal: characters that act on it, or that cannot be seen, are escaped.
+pub(crate) fn shown(line: &str) -> String {
+    let mut shown = String::with_capacity(line.len().min(MAX_LINE));
+    for (at, c) in line.chars().enumerate() {
+        match c {
+            _ if at == MAX_LINE => {
+                shown.push('…');
+                break;
+            }
+            '\\' | '\'' | '"' => shown.push(c),
+            _ => shown.extend(c.escape_debug()),
+        }
+    }
+    shown
 }
 
 /// A value in one line of JSON.

@@ -13,6 +13,7 @@ use super::report::{MemoryReport, TreeReport};
 use super::{milliseconds_since, scan, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
+use crate::output::is_written;
 use crate::progress::{Bar, Notes};
 
 /// Points that do not move.

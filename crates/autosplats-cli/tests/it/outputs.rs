@@ -214,3 +214,24 @@ fn every_bad_input_of_several_has_one_line() {
     assert_eq!(lines.len(), 2, "one for each of the two: {stderr}");
     assert!(lines[0].starts_with("error: none.ply: ") && lines[1].starts_with("error: nothing.las: "), "{stderr}");
 }
+
+#[test]
+fn names_cannot_act_on_the_terminal() {
+    let folder = Folder::with_sphere();
+    let odd = "a\u{1b}[31m\u{202e}b";
+    folder.write("pose.txt", "\u{1b}[2J 0 0\n");
+    let long = "x".repeat(100_000);
+    for arguments in [
+        vec!["info", odd],
+        vec!["convert", "sphere.ply", "no\u{1b}[0m/a.ply"],
+        vec!["render", "sphere.ply", "-o", "a.png", "--color", odd],
+        vec!["render", "sphere.ply", "-o", "a.png", "--pose", "sphere.ply=pose.txt"],
+        vec!["render", "sphere.ply", "-o", "a.png", "--color", &long],
+    ] {
+        let Outcome { code, stderr, .. } = folder.run(&arguments);
+        assert!(code == Some(2) || code == Some(3) || code == Some(4), "{arguments:?}: {code:?}");
+        let acts = |c: char| c != '\n' && c.is_control() || c == '\u{202e}';
+        assert!(!stderr.contains(acts), "{stderr:?}");
+        assert!(stderr.lines().count() == 1 && stderr.len() < 5000, "one line: {}", stderr.len());
+    }
+}
