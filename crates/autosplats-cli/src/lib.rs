@@ -42,7 +42,7 @@ pub use crate::console::Console;
 pub use crate::exit::Exit;
 use crate::exit::{Failure, suggest};
 pub use crate::interrupt::Interrupt;
-pub use crate::signals::{Signals, out_of_memory};
+pub use crate::signals::{Signals, out_of_memory, out_of_threads};
 use crate::threads::with_threads;
 
 /// Runs the command with `arguments`, without the program's name, and returns its exit code: 0, or that of an [`Exit`].

@@ -5,7 +5,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::process::ExitCode;
 
-use autosplats_cli::{Console, Signals, out_of_memory, run};
+use autosplats_cli::{Console, Signals, out_of_memory, out_of_threads, run};
 use autosplats_cloud::may_fail;
 
 /// The system's memory. An allocation that fails, and whose caller cannot go on without it, ends the process as an
@@ -17,6 +17,7 @@ static MEMORY: Memory = Memory;
 
 fn main() -> ExitCode {
     silence_drivers();
+    end_without_threads();
     let console = Console::of_process();
     let signals = Signals::end_the_process(&console);
     ExitCode::from(signals.finish(run(std::env::args_os().skip(1), &console)))
@@ -54,6 +55,17 @@ unsafe impl GlobalAlloc for Memory {
         // SAFETY: the caller keeps the contract.
         unsafe { System.dealloc(memory, layout) }
     }
+}
+
+/// Makes the lack of threads an error. The standard library panics where one cannot be started.
+fn end_without_threads() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if panic.payload_as_str().is_some_and(|said| said.starts_with("failed to spawn thread")) {
+            out_of_threads();
+        }
+        usual(panic);
+    }));
 }
 
 /// Keeps Mesa's device selection from printing to standard error, where the command's own messages go. Without a

@@ -98,11 +98,22 @@ fn leave_nothing(console: &Console, exit: Option<Exit>) {
 /// files in the making. Allocates nothing.
 #[cold]
 pub fn out_of_memory(bytes: usize) -> ! {
+    end_for_lack(format_args!("not enough memory: {bytes} more bytes cannot be had; free some, or ask for less"))
+}
+
+/// Like [`out_of_memory`], as no thread can be started.
+#[cold]
+pub fn out_of_threads() -> ! {
+    end_for_lack(format_args!("no more threads can be started; allow more memory or processes, or set --threads 1"))
+}
+
+fn end_for_lack(what: std::fmt::Arguments<'_>) -> ! {
     use std::io::Write as _;
+    abandon_films();
     abandon_drafts();
-    let mut line = [0; 128];
+    let mut line = [0; 160];
     let mut rest = &mut line[..];
-    let _ = writeln!(rest, "error: not enough memory: {bytes} more bytes cannot be had; free some, or ask for less");
+    let _ = writeln!(rest, "error: {what}");
     let left = rest.len();
     let len = line.len() - left;
     system::print(&line[..len]);
