@@ -114,23 +114,23 @@ mod special {
         use std::ffi::OsStr;
         use std::os::unix::ffi::OsStrExt as _;
         let folder = Folder::with_sphere();
-        let odd = |name: &'static [u8]| OsStr::from_bytes(name).to_owned();
-        let run = |words: &[&OsStr]| {
+        let run = |words: &[&[u8]]| {
+            let words = words.iter().map(|word| OsStr::from_bytes(word));
             let output = folder.command(&[]).args(words).output().expect("it starts");
             (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
         };
-        let (code, said) = run(&["convert".as_ref(), "sphere.ply".as_ref(), &odd(b"b\xff.ply")]);
+        let (code, said) = run(&[b"convert", b"sphere.ply", b"b\xff.ply"]);
         assert!(code == Some(2) && said.starts_with("error: b\u{fffd}.ply: this name is not UTF-8"), "{said}");
-        let picture = ["render".as_ref(), "sphere.ply".as_ref(), "--size".as_ref(), "60x40".as_ref(), "-o".as_ref()];
-        let (code, said) =
-            run(&[&picture[..], &[&odd(b"f\xff_%d.png"), "--frames".as_ref(), "0..0".as_ref()]].concat());
+        let picture: [&[u8]; 5] = [b"render", b"sphere.ply", b"--size", b"60x40", b"-o"];
+        let with = |more: &[&'static [u8]]| run(&[&picture[..], more].concat());
+        let (code, said) = with(&[b"f\xff_%d.png", b"--frames", b"0..0"]);
         assert!(code == Some(2) && said.contains("UTF-8"), "{said}");
-        let (code, said) = run(&[&picture[..], &[&odd(b"g\xff.png"), "--json".as_ref()]].concat());
+        let (code, said) = with(&[b"g\xff.png", b"--json"]);
         assert!(code == Some(2) && said.contains("--json"), "{said}");
         assert_eq!(folder.list(), ["sphere.ply"], "nothing was written");
-        let (code, said) = run(&[&picture[..], &[&odd(b"h\xff.png")]].concat());
+        let (code, said) = with(&[b"h\xff.png"]);
         assert_eq!(code, Some(0), "one picture may have such a name: {said}");
-        assert!(folder.path("").join(odd(b"h\xff.png")).is_file(), "exactly that name");
+        assert!(folder.path("").join(OsStr::from_bytes(b"h\xff.png")).is_file(), "exactly that name");
     }
 }
 
