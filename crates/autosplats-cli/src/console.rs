@@ -130,12 +130,56 @@ impl Console {
         self.message(format_args!("error: {error}"));
     }
 
-    /// Tells people something.
-    pub(crate) fn message(&self, message: impl Display) {
-        let line = format!("{message}\n");
-        // A message that cannot be printed cannot be complained about either.
-        let _ = self.streams.messages.lock().unwrap_or_else(PoisonError::into_inner).write_all(line.as_bytes());
+    /// Tells people why the command ends, unless somebody else does or there is nothing to say.
+    pub(crate) fn last_error(&self, error: &str) {
+        if self.interrupt.tell_end() && !error.is_empty() {
+            self.put(&format!("error: {error}"));
+        }
     }
+
+    /// Tells people that a signal ends the process.
+    pub(crate) fn ended(&self, exit: Exit) {
+        // The line feed leaves the cursor's line, where the terminal shows ^C and perhaps a progress bar.
+        let begin = if self.messages_to_terminal() { "\n" } else { "" };
+        let what = match exit {
+            Exit::HungUp => "hung up",
+            Exit::Terminated => "terminated",
+            _ => "interrupted",
+        };
+        self.put(&format!("{begin}error: {what}"));
+    }
+
+    /// Tells people something, unless the last message has been printed.
+    pub(crate) fn message(&self, message: impl Display) {
+        if !self.interrupt.is_told() {
+            self.put(&message.to_string());
+        }
+    }
+
+    fn put(&self, lines: &str) {
+        let lines: String = lines.split('\n').map(|line| shown(line) + "\n").collect();
+        // A message that cannot be printed cannot be complained about either.
+        let _ = self.streams.messages.lock().unwrap_or_else(PoisonError::into_inner).write_all(lines.as_bytes());
+    }
+}
+
+/// Longest line of a message, in characters. Messages quote names and files, which may be of any length.
+const MAX_LINE: usize = 4096;
+
+/// A line for a terminal: characters that act on it, or that cannot be seen, are escaped.
+pub(crate) fn shown(line: &str) -> String {
+    let mut shown = String::with_capacity(line.len().min(MAX_LINE));
+    for (at, c) in line.chars().enumerate() {
+        match c {
+            _ if at == MAX_LINE => {
+                shown.push('…');
+                break;
+            }
+            '\\' | '\'' | '"' => shown.push(c),
+            _ => shown.extend(c.escape_debug()),
+        }
+    }
+    shown
 }
 
 /// A value in one line of JSON.

@@ -24,7 +24,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
     let mut renderer = Renderer::new();
     for (name, about) in Scene::names() {
         let path = out.join(name).with_extension("png");
-        check_target(&path, &ReadFiles::default(), console)?;
+        check_target(&path, &ReadFiles::default())?;
         let input = format!("{SCENE_PREFIX}{name}");
         let inputs = Inputs::scene(name)?;
         let Some(scene) = inputs.only_scene() else { continue };

@@ -4,7 +4,7 @@ use std::fs::read_to_string;
 use std::time::Instant;
 
 use autosplats::{AdapterSummary, Backend as BackendChoice, Frame, Renderer, Settings, adapters};
-use autosplats_cloud::available_memory;
+use autosplats_cloud::{Draft, available_memory};
 use autosplats_formats::{formats, read, write, written_formats};
 use autosplats_scenes::Scene;
 use pulp::{Arch, Simd, WithSimd};
@@ -278,10 +278,12 @@ impl SelfTest {
         }
 
         let start = Instant::now();
-        let folder = tempfile::Builder::new().prefix("autosplats-").tempdir().map_err(|error| {
+        let place = std::env::temp_dir().join(format!("autosplats-{}.ply", std::process::id()));
+        // Never finished, so that nothing stays. The cloud is written in its place.
+        let draft = Draft::begin(&place, ".ply").map_err(|error| {
             format!("{}: cannot be written ({error}); set the variable TMPDIR to another folder", self.temporary_folder)
         })?;
-        let path = folder.path().join("test.ply");
+        let path = draft.path().to_owned();
         write(&cloud, &path, &()).map_err(|error| said(&error))?;
         self.write_ms = since(start);
         let start = Instant::now();

@@ -18,8 +18,12 @@ pub enum Exit {
     Device = 5,
     /// The task does not fit into memory.
     Memory = 6,
+    /// The terminal was closed.
+    HungUp = 129,
     /// The user pressed Ctrl-C.
     Interrupted = 130,
+    /// The system asked the command to end.
+    Terminated = 143,
 }
 
 /// Exit codes as `--help` explains them.
@@ -31,7 +35,7 @@ Exit codes:
   4    an output cannot be written
   5    no usable device for the backend asked for
   6    too large for this machine's memory
-  130  interrupted (Ctrl-C); no partial file is left";
+  130  interrupted (Ctrl-C); no partial file is left. A second Ctrl-C ends at once. 129 for SIGHUP, 143 for SIGTERM";
 
 /// Why a command failed.
 #[derive(Debug)]
@@ -102,7 +106,10 @@ impl From<autosplats_output::Error> for Failure {
 #[cfg(feature = "viewer")]
 impl From<autosplats_viewer::Error> for Failure {
     fn from(error: autosplats_viewer::Error) -> Self {
-        Self::of(error.kind(), error)
+        match error {
+            autosplats_viewer::Error::Unsaved(_) => Self::new(Exit::Output, error),
+            error => Self::of(error.kind(), error),
+        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! Requests to end a command early, such as Ctrl-C.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use autosplats_cloud::Progress;
 
@@ -18,33 +19,73 @@ struct State {
     end_now: AtomicBool,
     finish_first: AtomicBool,
     finishing: AtomicBool,
-    write_lock: Mutex<()>,
+    /// Whether somebody says why the command ends, which nobody else may add to.
+    is_told: AtomicBool,
+    /// Gets a message when the work is asked to finish.
+    to_wake: Mutex<Option<Sender<()>>>,
 }
 
 impl Interrupt {
     /// Asks the command to end. Returns false if the work finishes what it has, and true if it stops.
     pub fn request(&self) -> bool {
-        if self.0.finish_first.load(Ordering::SeqCst) && !self.0.finishing.swap(true, Ordering::SeqCst) {
+        if self.finishes() {
             return false;
         }
         self.0.end_now.store(true, Ordering::SeqCst);
         true
     }
 
-    /// Lock that is held while a temporary file exists. A process that holds it can end and leaves no such file.
-    pub fn writing(&self) -> MutexGuard<'_, ()> {
-        self.0.write_lock.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Asks the command to end, and to leave the last message to the caller. `None` if the work finishes what it has,
+    /// false if the command has failed and prints why.
+    pub(crate) fn end(&self) -> Option<bool> {
+        if self.finishes() {
+            return None;
+        }
+        // In this order, so that the command does not tell of the request.
+        let is_first = self.tell_end();
+        self.0.end_now.store(true, Ordering::SeqCst);
+        Some(is_first)
+    }
+
+    /// Asks the work to finish what it has. False if it cannot, or has been asked.
+    fn finishes(&self) -> bool {
+        if !self.0.finish_first.load(Ordering::SeqCst) || self.0.finishing.swap(true, Ordering::SeqCst) {
+            return false;
+        }
+        if let Some(sender) = self.0.to_wake.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            // The work may have ended.
+            let _ = sender.send(());
+        }
+        true
+    }
+
+    /// Whether the caller is the first who says why the command ends. Nobody else prints anything from then on.
+    pub(crate) fn tell_end(&self) -> bool {
+        !self.0.is_told.swap(true, Ordering::SeqCst)
+    }
+
+    /// Whether the last message has been printed, or is about to be.
+    pub(crate) fn is_told(&self) -> bool {
+        self.0.is_told.load(Ordering::SeqCst)
     }
 
     /// Forgets all requests, as a command ends.
     pub(crate) fn clear(&self) {
-        let State { end_now, finish_first, finishing, .. } = &*self.0;
-        [end_now, finish_first, finishing].into_iter().for_each(|flag| flag.store(false, Ordering::SeqCst));
+        let State { end_now, finish_first, finishing, is_told, to_wake } = &*self.0;
+        [end_now, finish_first, finishing, is_told].into_iter().for_each(|flag| flag.store(false, Ordering::SeqCst));
+        *to_wake.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     /// Makes the next request only ask the work to [finish](Self::ending).
     pub(crate) fn end_gently(&self) {
         self.0.finish_first.store(true, Ordering::SeqCst);
+    }
+
+    /// Like [`end_gently`](Self::end_gently), of work that waits for a message.
+    #[cfg(feature = "viewer")]
+    pub(crate) fn end_gently_by(&self, sender: Sender<()>) {
+        *self.0.to_wake.lock().unwrap_or_else(PoisonError::into_inner) = Some(sender);
+        self.end_gently();
     }
 
     /// Whether the work has been asked to finish.

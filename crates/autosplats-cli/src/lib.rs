@@ -3,6 +3,8 @@
 //! The command is thin: `args` is what was typed; each command turns it into one job for the libraries. Data and
 //! messages for people go to the two streams of a [`Console`].
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic where the stream cannot be written")]
+
 mod args;
 mod bench;
 mod choices;
@@ -22,6 +24,7 @@ mod pages;
 mod parts;
 mod progress;
 mod render;
+mod signals;
 mod threads;
 mod topics;
 mod values;
@@ -39,6 +42,7 @@ pub use crate::console::Console;
 pub use crate::exit::Exit;
 use crate::exit::{Failure, suggest};
 pub use crate::interrupt::Interrupt;
+pub use crate::signals::{Signals, out_of_memory, out_of_threads};
 use crate::threads::with_threads;
 
 /// Runs the command with `arguments`, without the program's name, and returns its exit code: 0, or that of an [`Exit`].
@@ -47,36 +51,39 @@ use crate::threads::with_threads;
 /// another number gets a pool of its own.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>, console: &Console) -> u8 {
     let words = std::iter::once("autosplats".into()).chain(arguments.into_iter().map(Into::into));
-    let code = match CommandLine::try_parse_from(words) {
+    let words: Vec<OsString> = words.collect();
+    let code = match CommandLine::try_parse_from(&words) {
         Err(help) if help.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             console.message(help.render().to_string().trim_end());
             Exit::Usage as u8
         }
-        parsed => exit_code(parsed, console),
+        // clap returns --help and --version as errors too.
+        Err(answer) if !answer.use_stderr() => {
+            exit_code(console.print_line(answer.render().to_string().trim_end()), console)
+        }
+        Err(error) if error.kind() == ErrorKind::InvalidUtf8 => exit_code(Err(not_utf8(&words)), console),
+        Err(error) => exit_code(Err(Failure::usage(one_line(&error))), console),
+        Ok(command_line) => exit_code(dispatch(command_line, console), console),
     };
     console.flush();
     console.interrupt().clear();
     code
 }
 
-/// Performs what was typed. Prints an error and returns the exit code.
-fn exit_code(parsed: Result<CommandLine, clap::Error>, console: &Console) -> u8 {
-    let outcome = match parsed {
-        Ok(command_line) => dispatch(command_line, console),
-        // clap returns --help and --version as errors too.
-        Err(answer) if !answer.use_stderr() => console.print_line(answer.render().to_string().trim_end()),
-        Err(error) => Err(Failure::usage(one_line(&error))),
-    };
-    match outcome {
-        Ok(()) => 0,
-        Err(failure) => {
-            // After a request to end, what stops early fails by errors of many kinds.
-            let is_requested = console.interrupt().requested();
-            let Failure { exit, message } = if is_requested { Failure::interrupted() } else { failure };
-            console.error(message);
-            exit as u8
-        }
-    }
+/// Prints an error and returns the exit code.
+fn exit_code(outcome: Result<(), Failure>, console: &Console) -> u8 {
+    let Err(failure) = outcome else { return 0 };
+    // After a request to end, what stops early fails by errors of many kinds.
+    let is_requested = console.interrupt().requested();
+    let Failure { exit, message } = if is_requested { Failure::interrupted() } else { failure };
+    console.last_error(&message);
+    exit as u8
+}
+
+/// The failure of a name that is no text.
+fn not_utf8(words: &[OsString]) -> Failure {
+    let word = words.iter().find(|word| word.to_str().is_none()).map(|word| word.display().to_string());
+    Failure::usage(format!("{}: this name is not UTF-8; rename the file", word.unwrap_or_default()))
 }
 
 fn dispatch(command_line: CommandLine, console: &Console) -> Result<(), Failure> {
@@ -87,7 +94,7 @@ fn dispatch(command_line: CommandLine, console: &Console) -> Result<(), Failure>
         // A window belongs to the thread that opens it.
         Command::View(args) => {
             threads::start_threads(threads)?;
-            view::run(&args)
+            view::run(&args, &console)
         }
         command => with_threads(threads, || start(command, &console)),
     }
@@ -95,7 +102,7 @@ fn dispatch(command_line: CommandLine, console: &Console) -> Result<(), Failure>
 
 fn start(command: Command, console: &Console) -> Result<(), Failure> {
     match command {
-        Command::View(args) => view::run(&args),
+        Command::View(args) => view::run(&args, console),
         Command::Render(args) => render::run(*args, console),
         Command::Convert(args) => convert::run(&args, console),
         Command::Normals(args) => normals::run(&args, console),

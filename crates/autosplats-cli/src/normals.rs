@@ -8,7 +8,7 @@ use autosplats::{
     NormalSettings, NormalsInParts, Orientation, PartsOptions, Viewpoint, estimate_normals, estimate_normals_in_parts,
 };
 use autosplats_cloud::{
-    Axes, Clouds, LocalMetres, PointCloud, Progress, Scan, Thinned, Thinning, Unit, add_scans, check_memory,
+    Axes, Clouds, LocalMetres, Output, PointCloud, Progress, Scan, Thinned, Thinning, Unit, add_scans, check_memory,
 };
 
 use crate::args::NormalsArgs;
@@ -16,7 +16,7 @@ use crate::choices::OrientChoice;
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
-use crate::output::{check_cloud_target, write_cloud};
+use crate::output::{check_cloud_target, forced, write_cloud};
 use crate::parts::{Need, Parts, WorkError, check_room, parts, sample_step};
 use crate::progress::Bar;
 
@@ -41,11 +41,12 @@ pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> 
             output.display()
         )));
     }
-    check_cloud_target(&output, *force, &inputs.files([]), console)?;
+    let output = forced(&output, *force);
+    check_cloud_target(output, &inputs.files([]))?;
     check_room(room)?;
     let need = Need { what: "the work", memory: BYTES_PER_POINT + CLOUD_BYTES, disk: DISK_BYTES };
-    if let Some(parts) = parts(&inputs, room, part, &output, &need, console)? {
-        return in_parts(args, &parts, &output, console);
+    if let Some(parts) = parts(&inputs, room, part, output.path, &need, console)? {
+        return in_parts(args, &parts, output, console);
     }
     inputs.check_memory()?;
     let (cloud, read) = inputs.read_part(part, console)?;
@@ -63,15 +64,15 @@ pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> 
     let normals = estimate_normals(&local, &NormalSettings { k: *k, orientation }, &bar)?;
     drop((bar, local));
     let cloud = normals.add_to(cloud)?;
-    let bytes = write_cloud(&cloud, &output, console)?;
-    let shown = output.display();
+    let bytes = write_cloud(&cloud, output, console)?;
+    let shown = output.path.display();
     console.tell(format_args!("{shown}: normals of {} points, pointing {towards}; {bytes} bytes", cloud.len()));
     Ok(())
 }
 
 /// Estimates and writes the normals of points that memory does not hold.
-fn in_parts(args: &NormalsArgs, parts: &Parts, output: &Path, console: &Console) -> Result<(), Failure> {
-    let failed = |error: WorkError| parts.failure(error, output);
+fn in_parts(args: &NormalsArgs, parts: &Parts, output: Output<'_>, console: &Console) -> Result<(), Failure> {
+    let failed = |error: WorkError| parts.failure(error, output.path);
     let thinning = Thinning { bounds: args.part.bounds, ..Thinning::default() };
     let thinned = Thinned::new(&parts.clouds, thinning, &parts.folder, parts.memory, &());
     let thinned = thinned.map_err(|error| failed(error.into()))?;
@@ -81,9 +82,8 @@ fn in_parts(args: &NormalsArgs, parts: &Parts, output: &Path, console: &Console)
     let settings = NormalSettings { k: args.k, orientation };
     let options = PartsOptions { memory: parts.memory, folder: parts.folder.clone() };
     let bar = Bar::new("estimating normals", console);
-    let writing = console.interrupt().writing();
     let normals = estimate_normals_in_parts(&local, &settings, &options, &bar).map_err(|error| failed(error.into()))?;
-    drop((writing, bar));
+    drop(bar);
     let (points, tiles, in_doubt) = (normals.len(), normals.tiles(), normals.in_doubt());
     let bytes = parts.write(&WithNormals { clouds: &thinned, normals }, output, console)?;
     if in_doubt > 0 {
@@ -91,7 +91,7 @@ fn in_parts(args: &NormalsArgs, parts: &Parts, output: &Path, console: &Console)
             "{in_doubt} points may have nearer neighbours than the memory held at once; allow more with --memory"
         ));
     }
-    let shown = output.display();
+    let shown = output.path.display();
     console.tell(format_args!(
         "{shown}: normals of {points} points, pointing {towards}, in {tiles} parts, {in_doubt} in doubt; {bytes} bytes"
     ));

@@ -1,11 +1,11 @@
 //! Outputs: checked before any work, written completely or not at all.
 
 use std::collections::HashSet;
-use std::fs::{File, create_dir_all, metadata};
-use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::fs::{File, create_dir_all};
+use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use autosplats_cloud::{Error, PointCloud, temporary_beside, write_whole};
+use autosplats_cloud::{Draft, Error, Existing, Output, PointCloud, write_whole};
 use autosplats_formats::check_writable;
 use autosplats_output::PictureFormat;
 
@@ -33,23 +33,33 @@ impl ReadFiles {
     }
 }
 
-/// Fails if the path cannot be written, or would overwrite an input.
-pub(crate) fn check_target(path: &Path, inputs: &ReadFiles, console: &Console) -> Result<(), Failure> {
-    let folder = folder_of(path);
-    let shown = path.display();
-    if path.is_dir() || path.file_name().is_none() {
-        return Err(Failure::new(Exit::Output, format!("{shown}: this is a folder; name a file")));
-    }
+/// The path that all names of a file share. The file need not exist.
+pub(crate) fn true_path(path: &Path) -> PathBuf {
+    let beside = || Some(folder_of(path).canonicalize().ok()?.join(path.file_name()?));
+    path.canonicalize().ok().or_else(beside).unwrap_or_else(|| path.to_owned())
+}
+
+/// Fails if the output cannot be written, or would overwrite an input.
+pub(crate) fn check_target<'a>(output: impl Into<Output<'a>>, inputs: &ReadFiles) -> Result<(), Failure> {
+    let output = output.into();
+    let (path, folder) = (output.path, folder_of(output.path));
     if !folder.is_dir() {
-        return Err(Failure::new(Exit::Output, format!("{shown}: there is no folder {}", folder.display())));
+        let [shown, folder] = [path, folder].map(Path::display);
+        return Err(Failure::new(Exit::Output, format!("{shown}: there is no folder {folder}")));
     }
     inputs.check(path)?;
     // Creating a file is the only reliable check that one can be created.
-    let _writing = console.interrupt().writing();
-    temporary_beside(path, ".tmp")
-        .map_err(|error| cannot_write(path, &error))?
-        .close()
-        .map_err(|error| cannot_write(path, &error))
+    Draft::begin(output, ".tmp").map(drop).map_err(|error| cannot_write(path, &error))
+}
+
+/// An output that replaces a file only with `force`.
+pub(crate) fn forced(path: &Path, force: bool) -> Output<'_> {
+    Output { path, existing: if force { Existing::Replace } else { Existing::Keep } }
+}
+
+/// Whether there is a file with content. A power cut may have left an empty one.
+pub(crate) fn is_written(path: &Path) -> bool {
+    path.metadata().is_ok_and(|metadata| metadata.len() > 0)
 }
 
 /// Creates a folder and those above it.
@@ -59,45 +69,32 @@ pub(crate) fn create_folder(path: &Path) -> Result<(), Failure> {
 }
 
 /// Writes a file atomically through `write`, and returns its size in bytes.
-pub(crate) fn write_file(
-    path: &Path,
+pub(crate) fn write_file<'a>(
+    output: impl Into<Output<'a>>,
     console: &Console,
     write: impl FnOnce(&mut BufWriter<Stoppable<'_>>) -> std::io::Result<()>,
 ) -> Result<u64, Failure> {
-    let interrupt = console.interrupt();
-    let failed = |error: std::io::Error| cannot_write(path, &error);
-    let _writing = interrupt.writing();
-    write_whole(path, failed, |file| {
+    let (output, interrupt) = (output.into(), console.interrupt());
+    let failed = |error: std::io::Error| cannot_write(output.path, &error);
+    write_whole(output, failed, |file| {
         let mut writer = BufWriter::with_capacity(1 << 18, Stoppable { file: file.get_mut(), interrupt });
         write(&mut writer).and_then(|()| writer.flush()).map_err(failed)
-    })?;
-    metadata(path).map(|metadata| metadata.len()).map_err(failed)
+    })
 }
 
 /// Writes a cloud atomically in the format of the path's extension. Returns the file's size in bytes.
-pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, console: &Console) -> Result<u64, Failure> {
-    let bar = Bar::on_file("writing", path, console);
-    let _writing = console.interrupt().writing();
-    match autosplats_formats::write(cloud, path, &bar) {
-        Ok(()) => metadata(path).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
-        Err(Error::Io { source, .. }) => Err(cannot_write(path, &source)),
-        Err(error) => Err(Failure::new(Exit::Output, error)),
-    }
+pub(crate) fn write_cloud(cloud: &PointCloud, output: Output<'_>, console: &Console) -> Result<u64, Failure> {
+    let bar = Bar::on_file("writing", output.path, console);
+    autosplats_formats::write(cloud, output, &bar).map_err(|error| match error {
+        Error::Io { source, .. } => cannot_write(output.path, &source),
+        error => Failure::new(Exit::Output, error),
+    })
 }
 
-/// Fails if the cloud's output has an unknown format, exists without `force`, or cannot be written.
-pub(crate) fn check_cloud_target(
-    path: &Path,
-    force: bool,
-    inputs: &ReadFiles,
-    console: &Console,
-) -> Result<(), Failure> {
-    check_writable(path)?;
-    check_target(path, inputs, console)?;
-    if !force && path.exists() {
-        return Err(Failure::new(Exit::Output, format!("{}: already exists; --force replaces it", path.display())));
-    }
-    Ok(())
+/// Fails if the cloud's output has an unknown format or cannot be written.
+pub(crate) fn check_cloud_target(output: Output<'_>, inputs: &ReadFiles) -> Result<(), Failure> {
+    check_writable(output.path)?;
+    check_target(output, inputs)
 }
 
 /// A file whose writes fail after Ctrl-C, so that a long write ends early.
@@ -127,10 +124,16 @@ impl Seek for Stoppable<'_> {
 }
 
 pub(crate) fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    let error = error.to_string();
-    // The caller does not know the temporary file's name.
-    let reason = error.split(" at path ").next().unwrap_or(&error);
-    Failure::new(Exit::Output, format!("{}: cannot be written: {reason}", path.display()))
+    let (shown, said) = (path.display(), error.to_string());
+    Failure::new(
+        Exit::Output,
+        match error.kind() {
+            ErrorKind::AlreadyExists => format!("{shown}: already exists; --force replaces it"),
+            ErrorKind::IsADirectory => format!("{shown}: this is a folder; name a file"),
+            // The caller does not know the temporary file's name.
+            _ => format!("{shown}: cannot be written: {}", said.split(" at path ").next().unwrap_or(&said)),
+        },
+    )
 }
 
 pub(crate) fn folder_of(path: &Path) -> &Path {

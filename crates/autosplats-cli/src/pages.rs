@@ -9,7 +9,7 @@ use clap_mangen::Man;
 use crate::args::{CommandLine, CompletionsArgs, ManArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
-use crate::output::{ReadFiles, check_target, create_folder, write_file};
+use crate::output::{ReadFiles, check_target, create_folder, forced, write_file};
 
 /// Prints the completion script of a shell.
 pub(crate) fn completions(args: &CompletionsArgs, console: &Console) -> Result<(), Failure> {
@@ -28,17 +28,11 @@ pub(crate) fn manual(args: &ManArgs, console: &Console) -> Result<(), Failure> {
     let paths: Vec<_> = pages.iter().map(|(name, _)| folder.join(format!("{name}.1"))).collect();
     // Every target is checked before the first is written, so that a refusal leaves no partial set.
     for path in &paths {
-        if path.exists() && !args.force {
-            return Err(Failure::new(
-                Exit::Output,
-                format!("{}: already exists; --force replaces pages", path.display()),
-            ));
-        }
-        check_target(path, &ReadFiles::default(), console)?;
+        check_target(forced(path, args.force), &ReadFiles::default())?;
     }
     for (path, (_, page)) in paths.iter().zip(&pages) {
         let page = render(page)?;
-        write_file(path, console, |writer| writer.write_all(&page))?;
+        write_file(forced(path, args.force), console, |writer| writer.write_all(&page))?;
         console.print_line(path.display())?;
     }
     Ok(())

@@ -1,9 +1,8 @@
 //! Work on more points than memory holds, in parts.
 
-use std::fs::metadata;
 use std::path::{Path, PathBuf};
 
-use autosplats_cloud::{Clouds, Error, Part, Progress as _, Spool, available_memory, check_disk, usual_memory};
+use autosplats_cloud::{Clouds, Error, Output, Part, Progress as _, Spool, available_memory, check_disk, usual_memory};
 use autosplats_formats::write_clouds;
 
 use crate::args::{PartArgs, RoomArgs};
@@ -90,7 +89,6 @@ pub(crate) fn parts(
     let folder = room.temp.clone().unwrap_or_else(|| folder_of(output).to_owned());
     let failed = |error| failure(error, output, &folder);
     let bar = Bar::on_file("reading", Path::new(&inputs.names()), console);
-    let _writing = console.interrupt().writing();
     let first = Part { whole: &bar, start: 0.0, len: 0.5 };
     let Some(clouds) = inputs.in_parts(&first).map_err(failed)? else {
         if room.memory.is_some() {
@@ -110,11 +108,9 @@ pub(crate) fn parts(
 
 impl Parts {
     /// Writes the points, of which this work made `clouds`. Returns the size of the file in bytes.
-    pub(crate) fn write(&self, clouds: &dyn Clouds, output: &Path, console: &Console) -> Result<u64, Failure> {
-        let bar = Bar::on_file("writing", output, console);
-        let _writing = console.interrupt().writing();
-        write_clouds(clouds, output, &bar).map_err(|error| self.failure(error, output))?;
-        metadata(output).map(|metadata| metadata.len()).map_err(|error| cannot_write(output, &error))
+    pub(crate) fn write(&self, clouds: &dyn Clouds, output: Output<'_>, console: &Console) -> Result<u64, Failure> {
+        let bar = Bar::on_file("writing", output.path, console);
+        write_clouds(clouds, output, &bar).map_err(|error| self.failure(error, output.path))
     }
 
     /// The failure of an error in the work.

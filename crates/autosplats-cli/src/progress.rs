@@ -10,7 +10,7 @@ use std::time::Duration;
 use autosplats_cloud::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::console::Console;
+use crate::console::{Console, shown};
 
 const SHOW_AFTER: Duration = Duration::from_millis(500);
 const REDRAW_INTERVAL: Duration = Duration::from_millis(100);
@@ -66,8 +66,8 @@ impl Bar {
     }
 
     fn start(task: &str, console: &Console, template: &str, characters: &str) -> Self {
-        let bar = ProgressBar::with_draw_target(Some(PROGRESS_STEPS), ProgressDrawTarget::hidden())
-            .with_message(task.to_owned());
+        let bar =
+            ProgressBar::with_draw_target(Some(PROGRESS_STEPS), ProgressDrawTarget::hidden()).with_message(shown(task));
         let (subject, console) = (String::new(), console.clone());
         if console.is_quiet() || !console.messages_to_terminal() {
             return Self { bar, subject, console, done: None, drawing: None };

@@ -1,12 +1,6 @@
-//! Files as bytes: mapped for reading, and written whole or not at all.
+//! Files as bytes: mapped for reading, and temporary ones.
 
-use std::{
-    ffi::OsStr,
-    fs::File,
-    io::{BufWriter, Read as _, Write as _},
-    ops::Deref,
-    path::Path,
-};
+use std::{fs::File, io::Read as _, ops::Deref, path::Path};
 
 use crate::Error;
 
@@ -49,63 +43,6 @@ impl Deref for Bytes {
             Self::Read(bytes) => bytes,
         }
     }
-}
-
-/// Size of the output buffer, in bytes.
-const BUFFER: usize = 1 << 20;
-
-/// Writes a file that appears complete or not at all, and replaces an existing one. A symbolic link stays, and its
-/// target is replaced. `write` fills a [temporary file](temporary_beside), which is then renamed; on failure it is
-/// removed. `failed` makes the caller's error of one of the operating system.
-///
-/// # Errors
-/// Those of `write`, and those of the operating system.
-///
-/// # Examples
-///
-/// ```
-/// use std::io::{Error, Write as _};
-///
-/// use autosplats_cloud::write_whole;
-///
-/// # let folder = tempfile::tempdir()?;
-/// # let path = folder.path().join("notes.txt");
-/// write_whole(&path, |error| error, |file| file.write_all(b"all of it"))?;
-/// let failed = write_whole(&path, |error| error, |file| {
-///     file.write_all(b"half")?;
-///     Err(Error::other("stopped"))
-/// });
-/// assert!(failed.is_err());
-/// assert_eq!(std::fs::read(&path)?, b"all of it");
-/// # Ok::<(), Error>(())
-/// ```
-pub fn write_whole<E>(
-    path: &Path,
-    failed: impl Fn(std::io::Error) -> E,
-    write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), E>,
-) -> Result<(), E> {
-    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let mut file = temporary_beside(&target, ".tmp").map_err(&failed)?;
-    let mut writer = BufWriter::with_capacity(BUFFER, file.as_file_mut());
-    write(&mut writer)?;
-    writer.flush().map_err(&failed)?;
-    drop(writer);
-    file.persist(target).map_err(|error| failed(error.error))?;
-    Ok(())
-}
-
-/// A temporary file in the folder of `path`, to be renamed once complete. Its name ends in `suffix`.
-///
-/// # Errors
-/// Those of the operating system.
-pub fn temporary_beside(path: &Path, suffix: impl AsRef<OsStr>) -> std::io::Result<tempfile::NamedTempFile> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".autosplats-").suffix(suffix.as_ref());
-    // Temporary files are private by default; the result shall have usual permissions.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
 }
 
 /// A temporary file without a name, which the system removes once it is closed, however the program ends.

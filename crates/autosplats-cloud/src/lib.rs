@@ -13,6 +13,8 @@
 //! assert_eq!(survey.world_position(1), DVec3::new(512_000.0, 5_400_000.0, 312.0));
 //! ```
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic where the stream cannot be written")]
+
 mod append;
 mod axes;
 mod classes;
@@ -31,11 +33,13 @@ mod identity;
 mod memory;
 mod merge;
 mod moved;
+mod output;
 mod pool;
 mod precision;
 mod progress;
 mod random;
 mod ranges;
+mod reserve;
 mod retain;
 mod sample;
 mod scale;
@@ -55,9 +59,7 @@ pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use encoding::{Unmarked, read_text};
 pub use error::{Error, excerpt, one_line, printable, shown_number};
 pub use error_kind::ErrorKind;
-pub use files::{
-    Bytes, check_disk, free_disk, read_exact_at, temporary_beside, temporary_unnamed, write_all_at, write_whole,
-};
+pub use files::{Bytes, check_disk, free_disk, read_exact_at, temporary_unnamed, write_all_at};
 pub use filter::{LeftOut, PointFilter};
 pub use geographic::{LocalMetres, looks_like_degrees};
 /// Vector library of the public interface.
@@ -65,6 +67,7 @@ pub use glam;
 pub use guard::guard;
 pub use memory::{available_memory, check_memory, own_memory, usual_memory};
 pub use merge::normal_matrix;
+pub use output::{Draft, Existing, Output, abandon_drafts, write_whole};
 pub use pool::{PointPool, PointRun, SLOT_POINTS, SLOT_SHIFT};
 pub use precision::{
     RelativeValues, ValueOrigin, degree_origin, residual, sample_step, sampled_bounds, sampled_middle, storage_origin,
@@ -72,6 +75,7 @@ pub use precision::{
 pub use progress::{Part, Progress};
 pub use random::Random;
 pub use ranges::{FileRanges, Folder, LocalFolder, MemoryRanges, Ranges, Traffic, check_range};
+pub use reserve::{may_fail, reserving};
 pub use sample::{SurfaceSamples, sample_surface};
 pub use scale::computing_scale_of;
 pub use spill::{Spill, SpillCell, lock};

@@ -3,12 +3,13 @@
 use std::ffi::OsString;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use autosplats::Image;
-use autosplats::cloud::temporary_beside;
-use tempfile::TempPath;
+use autosplats::cloud::{Draft, Output};
 
 use crate::Error;
 
@@ -42,9 +43,9 @@ pub fn has_ffmpeg() -> bool {
 pub struct Film {
     path: PathBuf,
     /// The unfinished file; `None` once it is in place.
-    part: Option<TempPath>,
+    part: Option<Draft>,
     size: [u32; 2],
-    child: Child,
+    child: Running,
     input: Option<ChildStdin>,
     /// Reads ffmpeg's messages, so that ffmpeg never waits for a reader.
     words: Option<JoinHandle<String>>,
@@ -56,21 +57,22 @@ impl Film {
     ///
     /// # Errors
     /// [`Error::Io`] if the folder is not writable, [`Error::NoFfmpeg`] if ffmpeg does not start.
-    pub fn begin(path: &Path, size: [u32; 2], rate: f64) -> Result<Self, Error> {
-        Self::with(path, size, |part| ffmpeg(part, size, rate))
+    pub fn begin<'a>(output: impl Into<Output<'a>>, size: [u32; 2], rate: f64) -> Result<Self, Error> {
+        Self::with(output.into(), size, |part| ffmpeg(part, size, rate))
     }
 
     /// Begins a film with a command that writes to the given path and reads pictures from its standard input.
-    fn with(path: &Path, size: [u32; 2], command: impl FnOnce(&Path) -> Command) -> Result<Self, Error> {
-        let part = temporary(path).map_err(|source| Error::Io { path: path.into(), source })?;
-        let mut command = command(&part);
+    fn with(output: Output<'_>, size: [u32; 2], command: impl FnOnce(&Path) -> Command) -> Result<Self, Error> {
+        let path = output.path;
+        // The extension tells ffmpeg the format.
+        let mut suffix = OsString::from(".");
+        suffix.push(path.extension().unwrap_or_default());
+        let part = Draft::begin(output, suffix).map_err(|source| Error::Io { path: path.into(), source })?;
+        let mut command = command(part.path());
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
-        // Ctrl-C must only reach this process, which then removes the unfinished file.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        let mut child = command.spawn().map_err(Error::NoFfmpeg)?;
-        let input = child.stdin.take();
-        let words = child.stderr.take().map(|mut pipe| {
+        let mut child = Running::start(command).map_err(Error::NoFfmpeg)?;
+        let input = child.child.stdin.take();
+        let words = child.child.stderr.take().map(|mut pipe| {
             std::thread::spawn(move || {
                 let mut words = Vec::new();
                 // Unreadable messages are dropped.
@@ -104,10 +106,10 @@ impl Film {
         if !status.success() {
             return Err(self.complaint());
         }
-        let place = |part: TempPath| {
-            part.persist(&self.path).map_err(|error| Error::Io { path: self.path.clone(), source: error.error })
-        };
-        self.part.take().map_or(Ok(()), place)
+        match self.part.take().map(Draft::finish) {
+            Some(Err(source)) => Err(Error::Io { path: self.path.clone(), source }),
+            _ => Ok(()),
+        }
     }
 
     /// Error with the last message of ffmpeg.
@@ -125,17 +127,85 @@ impl Drop for Film {
     fn drop(&mut self) {
         if self.part.is_some() {
             self.input = None;
-            let _ = self.child.kill();
+            self.child.kill();
             let _ = self.child.wait();
         }
     }
 }
 
-/// A file beside `path` with the same extension, which tells ffmpeg the format.
-fn temporary(path: &Path) -> std::io::Result<TempPath> {
-    let mut suffix = OsString::from(".");
-    suffix.push(path.extension().unwrap_or_default());
-    Ok(temporary_beside(path, suffix)?.into_temp_path())
+/// Process numbers of the running ffmpegs, and whether the process ends, so that none may start.
+static RUNNING: Mutex<(Vec<u32>, bool)> = Mutex::new((Vec::new(), false));
+
+/// Longest wait for the list of running ffmpegs when the process ends.
+const END_WITHIN: Duration = Duration::from_secs(1);
+
+/// Ends the ffmpegs of all films and lets no other start: for a process that ends now. Returns after a second at most.
+pub fn abandon_films() {
+    let begun = Instant::now();
+    while begun.elapsed() < END_WITHIN {
+        if let Ok(mut running) = RUNNING.try_lock() {
+            running.1 = true;
+            running.0.iter().for_each(|&number| kill_group(number));
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Ends a program and all that it has started.
+fn kill_group(number: u32) {
+    #[cfg(unix)]
+    if let Some(group) = i32::try_from(number).ok().and_then(rustix::process::Pid::from_raw) {
+        // It may have ended.
+        let _ = rustix::process::kill_process_group(group, rustix::process::Signal::KILL);
+    }
+    #[cfg(not(unix))]
+    let _ = number;
+}
+
+/// An ffmpeg that the list of all knows.
+#[derive(Debug)]
+struct Running {
+    child: Child,
+}
+
+impl Running {
+    fn start(mut command: Command) -> std::io::Result<Self> {
+        // Ctrl-C must only reach this process, which then removes the unfinished file.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let mut running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
+        if running.1 {
+            return Err(std::io::Error::other("the program ends"));
+        }
+        let child = command.spawn()?;
+        running.0.push(child.id());
+        Ok(Self { child })
+    }
+
+    fn wait(&mut self) -> std::io::Result<ExitStatus> {
+        let status = self.child.wait();
+        self.forget();
+        status
+    }
+
+    fn kill(&mut self) {
+        if matches!(self.child.try_wait(), Ok(None)) {
+            kill_group(self.child.id());
+            let _ = self.child.kill();
+        }
+    }
+
+    /// The number may be another program's from now on.
+    fn forget(&self) {
+        RUNNING.lock().unwrap_or_else(PoisonError::into_inner).0.retain(|&number| number != self.child.id());
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.forget();
+    }
 }
 
 /// The command that makes a film of raw pictures.
@@ -156,7 +226,7 @@ mod tests {
 
     /// A film of three pictures, made by a shell script with the file's name as `$0`.
     fn film(path: &Path, script: &str) -> Result<(), Error> {
-        let mut film = Film::with(path, SIZE, |part| {
+        let mut film = Film::with(path.into(), SIZE, |part| {
             let mut command = Command::new("sh");
             command.args(["-c", script]).arg(part);
             command
@@ -177,7 +247,7 @@ mod tests {
         assert_eq!(words("cat > \"$0\"; exit 1"), "ffmpeg: it failed without a message");
         // More than a pipe holds.
         assert_eq!(words("yes | head -c 300000 >&2; cat > \"$0\"; exit 1"), "ffmpeg: y", "it never waits for a reader");
-        let dropped = Film::with(&path, SIZE, |part| {
+        let dropped = Film::with((&path).into(), SIZE, |part| {
             let mut command = Command::new("sh");
             command.args(["-c", "cat > \"$0\""]).arg(part);
             command

@@ -17,13 +17,15 @@
 //! # }
 //! ```
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic where the stream cannot be written")]
+
 mod exr;
 mod film;
 mod picture;
 mod target;
 
 pub use exr::write_exr;
-pub use film::{Film, has_ffmpeg};
+pub use film::{Film, abandon_films, has_ffmpeg};
 pub use picture::{PictureFormat, write_picture, write_png};
 pub use target::{Frames, Target, has_number};
 

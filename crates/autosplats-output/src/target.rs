@@ -68,9 +68,11 @@ impl Target {
         match (extension.as_deref(), PictureFormat::of(path)) {
             (Some("mp4" | "mkv" | "webm" | "mov"), _) => Ok(Self::Film(path.into())),
             (Some(extension), Some(format)) => {
-                let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+                let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
+                    return Err(refuse("the names of numbered pictures have to be UTF-8"));
+                };
                 let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-                let (before, digits, after) = match number(&name) {
+                let (before, digits, after) = match number(name) {
                     Some((place, digits)) => (name[..place.start].into(), digits, name[place.end..].to_owned()),
                     None => {
                         let stem = &name[..name.len() - extension.len() - 1];
@@ -131,10 +133,15 @@ impl Target {
     /// ```
     pub fn existing(&self, pictures: usize) -> Option<PathBuf> {
         match self {
-            Self::Film(path) => Some(path.clone()).filter(|path| path.exists()),
-            Self::Frames(frames) => (0..pictures).map(|number| frames.file(number)).find(|path| path.exists()),
+            Self::Film(path) => Some(path.clone()).filter(|path| is_there(path)),
+            Self::Frames(frames) => (0..pictures).map(|number| frames.file(number)).find(|path| is_there(path)),
         }
     }
+}
+
+/// Whether something is at a path, which may be a link to nothing.
+fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
 }
 
 impl Frames {

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use autosplats_cli::{Console, Exit};
+use autosplats_cli::{Console, Exit, Signals};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
@@ -16,31 +16,17 @@ use crate::wait::run;
 const STEP: Duration = Duration::from_millis(10);
 
 /// Runs the command with the arguments of the process, on its streams, and returns the exit code. As in the program,
-/// Ctrl-C ends the process unless the work finishes what it has.
+/// signals end the process unless the work finishes what it has.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, arguments: Vec<String>) -> u8 {
     let console = Console::of_process();
-    let (waiting, ended) = (thread::current(), AtomicBool::new(false));
-    thread::scope(|scope| {
-        let command = scope.spawn(|| {
-            let code = autosplats_cli::run(arguments, &console);
-            ended.store(true, Ordering::SeqCst);
-            waiting.unpark();
-            code
-        });
-        while !ended.load(Ordering::SeqCst) && !command.is_finished() {
-            py.detach(|| thread::park_timeout(STEP));
-            if py.check_signals().is_err() && console.interrupt().request() {
-                // The writing thread sees the request, removes its temporary file and releases the lock.
-                py.detach(|| {
-                    let _nothing_is_being_written = console.interrupt().writing();
-                    eprintln!("\nerror: interrupted");
-                    std::process::exit(Exit::Interrupted as i32);
-                });
-            }
-        }
-        command.join().unwrap_or(101)
-    })
+    let signals = Signals::end_the_process(&console);
+    let work = || signals.finish(autosplats_cli::run(arguments, &console));
+    // A thread as any other program's, whatever Python's own has.
+    let code = py.detach(|| thread::scope(|scope| scope.spawn(work).join().unwrap_or(101)));
+    // Python has heard of the Ctrl-C at which the work has finished.
+    let _ = py.check_signals();
+    code
 }
 
 /// A stream into memory.

@@ -120,13 +120,17 @@ fn of_system(path: &Path, error: &std::io::Error) -> PyErr {
     let text = error.to_string();
     // What follows is the number, or the name of a temporary file, which the caller does not know.
     let end = [" (os error ", " at path "].into_iter().filter_map(|end| text.find(end)).min().unwrap_or(text.len());
-    let said = text[..end].to_owned();
+    let said = match error.kind() {
+        ErrorKind::AlreadyExists => "the file exists; overwrite=True replaces it".into(),
+        _ => text[..end].to_owned(),
+    };
     let number = error.raw_os_error().or(match error.kind() {
         // An error about a temporary file has no number, but a kind.
         ErrorKind::NotFound => Some(2),
         ErrorKind::PermissionDenied => Some(13),
         ErrorKind::AlreadyExists => Some(17),
         ErrorKind::NotADirectory => Some(20),
+        ErrorKind::IsADirectory => Some(21),
         _ => None,
     });
     match number {

@@ -4,6 +4,8 @@
 //! All long work leaves the interpreter: [`wait::run`] computes in threads of [`pool`] while the caller waits for
 //! signals. Clouds and pictures are immutable; arrays show their memory without a copy.
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic where the stream cannot be written")]
+
 mod camera;
 mod cloud;
 mod command;

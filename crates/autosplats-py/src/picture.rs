@@ -13,7 +13,7 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::camera::{parsed, written};
 use crate::errors::{self, Class, Failure};
-use crate::read::check_absent;
+use crate::read::output;
 use crate::view::view;
 use crate::wait::run;
 
@@ -195,13 +195,14 @@ impl Frame {
     fn save(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> PyResult<()> {
         let extension = path.extension().map(|extension| extension.to_string_lossy().into_owned()).unwrap_or_default();
         let format = self.format(&extension)?;
-        check_absent(&path, overwrite)?;
+        let output = output(&path, overwrite)?;
         run(py, None, None, |_| {
             let failed = |error| Failure::Io(path.clone(), error);
-            write_whole(&path, failed, |file| {
+            let written = write_whole(output, failed, |file| {
                 let mut writer = BufWriter::with_capacity(1 << 18, file.get_mut());
                 self.write(format, &mut writer).and_then(|()| writer.flush()).map_err(failed)
-            })
+            });
+            written.map(|_bytes| ())
         })
     }
 

@@ -1,23 +1,18 @@
 //! Files, scenes and other sources to clouds, and clouds to files.
 
-use std::ffi::c_int;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use autosplats::{Camera, Projection};
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{Error, PointCloud, PointFilter, Progress};
+use autosplats_cloud::{Draft, Error, Existing, Output, PointCloud, PointFilter, Progress};
 use autosplats_formats::{Part, ReadOptions, check_writable};
 use autosplats_scenes::View;
 use autosplats_sources::{Source, read_tree};
-use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 
 use crate::cloud::Cloud;
 use crate::errors::Failure;
 use crate::wait::run;
-
-/// Number of the error that a file exists; the same on all systems that Python runs on.
-const EEXIST: c_int = 17;
 
 /// Options of reading, as Python hands them over.
 #[derive(FromPyObject)]
@@ -123,20 +118,20 @@ pub(crate) fn write(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<()> {
     check_writable(&path).map_err(|error| Failure::Cloud(error).raise())?;
-    check_absent(&path, overwrite)?;
+    let output = output(&path, overwrite)?;
     run(py, threads, progress, |watch| {
-        autosplats_formats::write(&cloud.cloud, &path, watch).map_err(|error| match error {
+        let written = autosplats_formats::write(&cloud.cloud, output, watch).map_err(|error| match error {
             Error::Io { path, source } => Failure::Io(path, source),
             error => error.into(),
-        })
+        });
+        written.map(|_bytes| ())
     })
 }
 
-/// Raises FileExistsError if the file exists and must not be overwritten.
-pub(crate) fn check_absent(path: &std::path::Path, overwrite: bool) -> PyResult<()> {
-    if overwrite || !path.exists() {
-        return Ok(());
-    }
-    let what = "the file exists; overwrite=True replaces it";
-    Err(PyOSError::new_err((EEXIST, what, path.display().to_string())))
+/// The output of a path. Raises OSError if it cannot be written, or exists and must not be overwritten.
+pub(crate) fn output(path: &Path, overwrite: bool) -> PyResult<Output<'_>> {
+    let output = Output { path, existing: if overwrite { Existing::Replace } else { Existing::Keep } };
+    // Beginning a file is the only reliable check that one can be written.
+    Draft::begin(output, ".tmp").map_err(|error| Failure::Io(path.into(), error).raise())?;
+    Ok(output)
 }

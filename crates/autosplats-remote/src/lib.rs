@@ -24,6 +24,8 @@
 //! A wait cannot be broken from outside, since the client blocks. So the caller's thread waits for results, and leaves
 //! when it is told to. The threads it leaves behind end with their time limits.
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic where the stream cannot be written")]
+
 mod address;
 mod batch;
 mod content_range;

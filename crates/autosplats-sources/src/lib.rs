@@ -10,6 +10,8 @@
 //! # Ok::<(), autosplats_cloud::Error>(())
 //! ```
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic where the stream cannot be written")]
+
 mod address;
 mod align;
 mod animation;

@@ -7,7 +7,7 @@ use std::{
 };
 
 use autosplats_cloud::{Error, PointCloud, Progress, Tree};
-use autosplats_formats::{ReadOptions, colors_beside, open_tree, read_mesh};
+use autosplats_formats::{ReadOptions, files_beside, open_tree, read_mesh};
 use autosplats_scenes::{SCENE_PREFIX, Scene};
 
 #[cfg(feature = "zenoh")]
@@ -155,7 +155,7 @@ impl Source {
         }
     }
 
-    /// All files that currently belong to the source, and the images that give depth images their colours.
+    /// All files that currently belong to the source, and those that [they refer to](files_beside).
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files = match self {
             Self::File(path) => vec![path.clone()],
@@ -164,8 +164,8 @@ impl Source {
             Self::Sequence(name) => candidates(name).unwrap_or_default(),
             Self::Scene(..) | Self::StandardInput | Self::Remote(_) | Self::Address(_) => Vec::new(),
         };
-        let colors: Vec<PathBuf> = files.iter().filter_map(|file| colors_beside(file)).collect();
-        files.extend(colors);
+        let beside: Vec<PathBuf> = files.iter().flat_map(|file| files_beside(file)).collect();
+        files.extend(beside);
         files
     }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 
-use autosplats::cloud::write_whole;
+use autosplats::cloud::{Output, write_whole};
 use eframe::egui;
 
 use crate::threads::spawn;
@@ -53,11 +53,16 @@ pub(crate) fn ask_for_output(context: &egui::Context, title: &str, name: &str) -
 }
 
 /// Writes a file atomically: it appears complete or not at all.
-pub(crate) fn write(
-    path: &Path,
+pub(crate) fn write<'a>(
+    output: impl Into<Output<'a>>,
     content: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
-    write_whole(path, |error| error, |file| content(file))
+    write_whole(output, |error| error, |file| content(file)).map(|_bytes| ())
+}
+
+/// Whether something is at a path, which may be a link to nothing.
+pub(crate) fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
 }
 
 #[cfg(test)]

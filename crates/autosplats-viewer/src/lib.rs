@@ -14,6 +14,8 @@
 //! imports only those before it. `app` holds all three, and the work of each window frame. The window never waits:
 //! threads of their own read files and render pictures, and send their results.
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic where the stream cannot be written")]
+
 mod app;
 mod files;
 mod messages;
@@ -24,7 +26,10 @@ mod threads;
 mod ui;
 mod view;
 
+use std::cell::RefCell;
 use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::mpsc::Receiver;
 
 use autosplats::Backend;
 use autosplats::cloud::ErrorKind;
@@ -47,6 +52,8 @@ pub struct Options {
     pub backend: Option<Backend>,
     /// How much of octrees is read.
     pub trees: TreeOptions,
+    /// A message closes the window, as its button does.
+    pub close: Option<Receiver<()>>,
 }
 
 /// Why no window could be opened.
@@ -59,6 +66,9 @@ pub enum Error {
     /// The session file could not be read.
     #[error("{0}")]
     State(String),
+    /// The session file could not be written at the end.
+    #[error("{0}")]
+    Unsaved(String),
 }
 
 impl Error {
@@ -68,6 +78,7 @@ impl Error {
         match self {
             Self::Window(_) => ErrorKind::Device,
             Self::State(_) => ErrorKind::Data,
+            Self::Unsaved(_) => ErrorKind::Io,
         }
     }
 }
@@ -75,8 +86,8 @@ impl Error {
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// [`Error::Window`], and [`Error::State`] if the session file exists but is invalid.
-pub fn run(options: Options) -> Result<(), Error> {
+/// [`Error::Window`], [`Error::State`] if the session file exists but is invalid, and [`Error::Unsaved`].
+pub fn run(mut options: Options) -> Result<(), Error> {
     let path = options.state.as_deref().filter(|path| path.exists());
     let state = path.map(view::state::State::read).transpose().map_err(Error::State)?;
     let viewport = egui::ViewportBuilder::default()
@@ -87,12 +98,17 @@ pub fn run(options: Options) -> Result<(), Error> {
         .with_drag_and_drop(true);
     let native =
         eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, dithering: false, ..Default::default() };
+    let close = options.close.take();
+    let unsaved = Rc::<RefCell<Option<String>>>::default();
+    let told = Rc::clone(&unsaved);
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
         colors(&creation.egui_ctx);
+        close.into_iter().for_each(|close| close_on(close, &creation.egui_ctx));
         let (look, recent) = view::storage::load(creation.storage);
         let mut app = app::App::new(options, look, recent, &creation.egui_ctx);
         app.view.format = creation.wgpu_render_state.as_ref().map(|state| state.target_format);
         app.view.turns = view::turns::are_taken(creation).then(Default::default);
+        app.unsaved = told;
         if let Some(state) = state {
             let folder = app.session.file.as_deref().map(view::state::folder).unwrap_or_default();
             state.restore(&mut app.session, &mut app.view, &folder);
@@ -103,7 +119,19 @@ pub fn run(options: Options) -> Result<(), Error> {
     if cfg!(target_os = "linux") && screens.iter().all(|name| std::env::var_os(name).is_none()) {
         return Err(Error::Window("there is no screen, as neither DISPLAY nor WAYLAND_DISPLAY is set".into()));
     }
-    eframe::run_native("autosplats", native, create).map_err(|error| Error::Window(error.to_string()))
+    eframe::run_native("autosplats", native, create).map_err(|error| Error::Window(error.to_string()))?;
+    unsaved.take().map_or(Ok(()), |why| Err(Error::Unsaved(why)))
+}
+
+/// Closes the window once a message comes.
+fn close_on(close: Receiver<()>, context: &egui::Context) {
+    let context = context.clone();
+    threads::spawn("close", move || {
+        if close.recv().is_ok() {
+            context.send_viewport_cmd(egui::ViewportCommand::Close);
+            context.request_repaint();
+        }
+    });
 }
 
 /// Sets readable colours: egui's own red is too dark on a dark background.

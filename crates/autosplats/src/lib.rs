@@ -26,6 +26,8 @@
 //! [`estimate_normals`] computes normal, curvature and density radius of all points of a cloud, visible or not. It uses
 //! the exact nearest neighbours in space.
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic where the stream cannot be written")]
+
 mod adapt;
 mod camera;
 mod cancel;

@@ -4,13 +4,13 @@ mod tree;
 
 use std::path::Path;
 
-use autosplats_cloud::{Crs, PointCloud, Thinned, Thinning, Unit};
+use autosplats_cloud::{Crs, Output, PointCloud, Thinned, Thinning, Unit};
 
 use crate::args::{ConvertArgs, ThinningArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
-use crate::output::{check_cloud_target, write_cloud};
+use crate::output::{check_cloud_target, forced, write_cloud};
 use crate::parts::{Need, Parts, check_room, parts};
 use crate::progress::Bar;
 
@@ -24,14 +24,15 @@ const VOXEL_BYTES: u64 = 32;
 pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
     let ConvertArgs { paths, input, force, part, thinning, .. } = args;
     let (inputs, output) = Inputs::with_output(paths, args.output.as_deref(), input)?;
-    check_cloud_target(&output, *force, &inputs.files([]), console)?;
+    let output = forced(&output, *force);
+    check_cloud_target(output, &inputs.files([]))?;
     check_room(&args.room)?;
-    if tree::is_tree(&output) {
-        return tree::run(args, &inputs, &output, console);
+    if tree::is_tree(output.path) {
+        return tree::run(args, &inputs, output, console);
     }
     let need = Need { what: "the work", memory: BYTES_PER_POINT, disk: thinning.voxel.map_or(0, |_| VOXEL_BYTES) };
-    if let Some(parts) = parts(&inputs, &args.room, part, &output, &need, console)? {
-        return in_parts(args, &parts, &output, console);
+    if let Some(parts) = parts(&inputs, &args.room, part, output.path, &need, console)? {
+        return in_parts(args, &parts, output, console);
     }
     inputs.check_memory()?;
     let (mut cloud, read) = match input.playing.sample {
@@ -48,8 +49,8 @@ pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> 
     if cloud.is_empty() {
         return Err(Failure::new(Exit::Input, format!("none of the {read} points lies inside; widen --bounds")));
     }
-    let bytes = write_cloud(&cloud, &output, console)?;
-    tell(&output, cloud.len() as u64, read, bytes, console);
+    let bytes = write_cloud(&cloud, output, console)?;
+    tell(output.path, cloud.len() as u64, read, bytes, console);
     Ok(())
 }
 
@@ -65,17 +66,16 @@ fn note_degrees(crs: &Crs, thinning: &ThinningArgs, console: &Console) {
 }
 
 /// Thins and writes points that memory does not hold.
-fn in_parts(args: &ConvertArgs, parts: &Parts, output: &Path, console: &Console) -> Result<(), Failure> {
+fn in_parts(args: &ConvertArgs, parts: &Parts, output: Output<'_>, console: &Console) -> Result<(), Failure> {
     let ThinningArgs { every, voxel, noise, seed } = args.thinning;
     note_degrees(parts.clouds.crs(), &args.thinning, console);
     let thinning = Thinning { bounds: args.part.bounds, every, voxel, noise: noise.map(|sigma| (sigma, seed)) };
-    let _writing = console.interrupt().writing();
     let bar = Bar::new("thinning", console);
     let thinned = Thinned::new(&parts.clouds, thinning, &parts.folder, parts.memory, &bar);
-    let thinned = thinned.map_err(|error| parts.failure(error, output))?;
-    drop((bar, _writing));
+    let thinned = thinned.map_err(|error| parts.failure(error, output.path))?;
+    drop(bar);
     let bytes = parts.write(&thinned, output, console)?;
-    tell(output, thinned.kept(), parts.points, bytes, console);
+    tell(output.path, thinned.kept(), parts.points, bytes, console);
     Ok(())
 }
 

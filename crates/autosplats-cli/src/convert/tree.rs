@@ -1,16 +1,15 @@
 //! Writing one octree of all inputs, in bounded memory.
 
-use std::fs::metadata;
 use std::path::Path;
 
-use autosplats_cloud::usual_memory;
+use autosplats_cloud::{Output, usual_memory};
 use autosplats_formats::{TreeOptions, write_tree};
 
 use crate::args::ConvertArgs;
 use crate::console::Console;
 use crate::exit::Failure;
 use crate::input::Inputs;
-use crate::output::{cannot_write, folder_of};
+use crate::output::folder_of;
 use crate::parts::failure;
 use crate::progress::Bar;
 
@@ -41,7 +40,7 @@ fn check(args: &ConvertArgs) -> Result<(), Failure> {
 }
 
 /// Reads the inputs and writes the tree.
-pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: &Path, console: &Console) -> Result<(), Failure> {
+pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: Output<'_>, console: &Console) -> Result<(), Failure> {
     check(args)?;
     let options = TreeOptions {
         memory: args.room.memory.unwrap_or_else(usual_memory),
@@ -50,18 +49,17 @@ pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: &Path, console: &
         keep: args.input.reading.keep.clone(),
         keep_no_returns: args.input.reading.keep_no_returns,
     };
-    let bar = Bar::on_file("building", output, console);
-    let _writing = console.interrupt().writing();
-    let temp = options.temp.as_deref().unwrap_or(folder_of(output));
+    let bar = Bar::on_file("building", output.path, console);
+    let temp = options.temp.as_deref().unwrap_or(folder_of(output.path));
     let summary =
-        write_tree(inputs.streamed(), output, &options, &bar).map_err(|error| failure(error, output, temp))?;
+        write_tree(inputs.streamed(), output, &options, &bar).map_err(|error| failure(error, output.path, temp))?;
     drop(bar);
-    let bytes = metadata(output).map(|metadata| metadata.len()).map_err(|error| cannot_write(output, &error))?;
     console.tell(format_args!(
-        "{}: {} points in {} nodes, {bytes} bytes; {} bytes of disk for temporary records",
-        output.display(),
+        "{}: {} points in {} nodes, {} bytes; {} bytes of disk for temporary records",
+        output.path.display(),
         summary.points,
         summary.nodes,
+        summary.bytes,
         summary.temporary
     ));
     Ok(())

@@ -107,12 +107,11 @@ impl Printer<'_> {
         if self.json {
             self.console.print_line(if self.several { "\n]" } else { "" })?;
         }
-        let inputs = self.failures.len();
-        let mut failures: Vec<Failure> = self.failures.into_iter().flatten().collect();
-        match failures.len() {
-            0 => Ok(()),
-            1 if inputs == 1 => Err(failures.remove(0)),
-            bad => Err(Failure::new(Exit::Input, format!("{bad} of {inputs} inputs could not be read"))),
+        match self.failures.into_iter().flatten().next() {
+            None => Ok(()),
+            // Each has been told of.
+            Some(_) if self.several => Err(Failure::new(Exit::Input, "")),
+            Some(failure) => Err(failure),
         }
     }
 }

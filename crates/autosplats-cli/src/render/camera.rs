@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{Axes, PointCloud, read_text};
+use autosplats_cloud::{Axes, Output, PointCloud, read_text};
 use autosplats_formats::PinholeCamera;
 use autosplats_scenes::{Scene, View};
 use serde_json::error::Category;
@@ -13,8 +13,8 @@ use serde_json::error::Category;
 use crate::args::CameraArgs;
 use crate::choices::{AxesChoice, Side};
 use crate::console::Console;
-use crate::exit::Failure;
-use crate::output::write_file;
+use crate::exit::{Exit, Failure};
+use crate::output::{ReadFiles, check_target, forced, write_file};
 use crate::values::Ortho;
 
 /// A camera that is placed once the points are known.
@@ -197,9 +197,32 @@ fn of_pinhole(path: &Path, pinhole: &PinholeCamera, console: &Console) -> Result
     Ok(camera)
 }
 
+/// Longest file that may be a saved camera, in bytes.
+const MAX_CAMERA: u64 = 1 << 16;
+
+/// The output for a camera: a file with another content stays.
+///
+/// # Errors
+/// Those of an output that cannot be written, and of a file that is not a saved camera.
+pub(super) fn output<'a>(path: &'a Path, inputs: &ReadFiles) -> Result<Output<'a>, Failure> {
+    let there = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file);
+    let replaces = |metadata: std::fs::Metadata| {
+        metadata.len() == 0
+            || metadata.len() <= MAX_CAMERA
+                && std::fs::read(path).is_ok_and(|bytes| serde_json::from_slice::<Camera>(&bytes).is_ok())
+    };
+    let output = forced(path, there.is_some());
+    check_target(output, inputs)?;
+    if there.is_some_and(|metadata| !replaces(metadata)) {
+        let why = "already exists and is no saved camera; name another file";
+        return Err(Failure::new(Exit::Output, format!("{}: {why}", path.display())));
+    }
+    Ok(output)
+}
+
 /// Writes a camera as JSON and returns the file's size in bytes.
-pub(super) fn save(path: &Path, camera: &Camera, console: &Console) -> Result<u64, Failure> {
-    write_file(path, console, |writer| {
+pub(super) fn save(path: &Path, camera: &Camera, inputs: &ReadFiles, console: &Console) -> Result<u64, Failure> {
+    write_file(output(path, inputs)?, console, |writer| {
         serde_json::to_writer_pretty(&mut *writer, camera).map_err(Error::other)?;
         writeln!(writer)
     })

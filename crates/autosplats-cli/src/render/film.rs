@@ -30,7 +30,8 @@ impl FilmJob {
         let many = |path: &PathBuf| {
             let name = path.to_string_lossy();
             let film = Target::new(path).is_ok_and(|target| matches!(target, Target::Film(_)));
-            film || has_number(&name) && Target::new(path).is_ok()
+            // Of a name that is no text, the target tells what is wrong.
+            film || has_number(&name) && (Target::new(path).is_ok() || path.to_str().is_none())
         };
         if frames.is_none() && !resume && !watch && !outputs.iter().any(many) {
             return Ok(None);

@@ -13,6 +13,7 @@ use super::report::{MemoryReport, TreeReport};
 use super::{milliseconds_since, scan, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
+use crate::output::is_written;
 use crate::progress::{Bar, Notes};
 
 /// Points that do not move.
@@ -121,7 +122,7 @@ pub(super) fn run(
         for (number, frame) in frames.clone().enumerate() {
             bar.tick(number as f32 / frames.len() as f32)?;
             let picture = film.file(frame);
-            if film.resume && picture.as_ref().is_some_and(|picture| picture.exists()) {
+            if film.resume && picture.as_deref().is_some_and(is_written) {
                 tally.kept += 1;
                 continue;
             }

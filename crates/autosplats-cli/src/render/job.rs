@@ -10,7 +10,7 @@ use autosplats::{
 use autosplats_cloud::{PointCloud, check_memory};
 use autosplats_output::PictureFormat;
 
-use super::camera::CameraJob;
+use super::camera::{self, CameraJob};
 use super::film::FilmJob;
 use super::path::CameraPath;
 use crate::args::{LookArgs, RenderArgs, SurfaceArgs, TreeArgs};
@@ -19,7 +19,7 @@ use crate::console::Console;
 use crate::exit::{Exit, Failure, suggest};
 use crate::first_radius::settle_first_radius;
 use crate::input::Inputs;
-use crate::output::{Format, Picture, ReadFiles, check_target};
+use crate::output::{Format, Picture, ReadFiles, check_target, true_path};
 use crate::values::FirstRadius;
 
 /// A picture to render: everything except the points.
@@ -108,13 +108,20 @@ impl Job {
         let camera = CameraJob::new(&camera, console)?;
         let path = CameraPath::new(&camera_path, duration, console)?;
         let read_files = inputs.files(camera.file().into_iter().chain(camera_path.iter().map(PathBuf::as_path)));
-        let targets = pictures.iter().map(|picture| &picture.path).chain(&named).chain(&save_camera);
+        let pictured = pictures.iter().map(|picture| &picture.path).chain(&named);
         let mut seen = HashSet::new();
-        for target in targets {
-            if !seen.insert(target) {
-                return Err(Failure::usage(format!("{}: two outputs have this name", target.display())));
+        for target in pictured.clone().chain(&save_camera) {
+            if !seen.insert(true_path(target)) {
+                return Err(Failure::usage(format!("{}: two outputs are this file", target.display())));
             }
-            check_target(target, &read_files, console)?;
+            if json && target.to_str().is_none() {
+                let why = "--json cannot tell this name, which is not UTF-8; choose another one";
+                return Err(Failure::usage(format!("{}: {why}", target.display())));
+            }
+        }
+        pictured.into_iter().try_for_each(|target| check_target(target, &read_files))?;
+        if let Some(path) = &save_camera {
+            camera::output(path, &read_files)?;
         }
         let [width, height] = size.map(|side| u64::from(side) * u64::from(supersample));
         if width.max(height) > u64::from(MAX_SIDE) {

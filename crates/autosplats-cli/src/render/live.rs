@@ -18,7 +18,6 @@ use crate::device::Device;
 use crate::exit::{Exit, Failure};
 use crate::input::Playing;
 use crate::interrupt::Interrupt;
-use crate::output::check_target;
 use crate::progress::{Bar, Notes};
 
 /// Time to listen to one stream before the next.
@@ -76,8 +75,7 @@ pub(super) fn run(
                 None => {
                     let camera = place.settle(job, renderer, &cloud, Arc::clone(&cloud))?;
                     if let Some(path) = &job.save_camera {
-                        check_target(path, &job.read_files, &job.console)?;
-                        camera::save(path, &camera, &job.console)?;
+                        camera::save(path, &camera, &job.read_files, &job.console)?;
                     }
                     first_frame.insert(First { frame, came: Instant::now(), camera, rate: evenly.then_some(rate) })
                 }

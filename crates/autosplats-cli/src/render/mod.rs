@@ -128,7 +128,7 @@ impl Placed {
             written.push((picture.path.clone(), write_picture(picture, &frame, &camera, job)?));
         }
         if let Some(path) = &job.save_camera {
-            written.push((path.clone(), camera::save(path, &camera, &job.console)?));
+            written.push((path.clone(), camera::save(path, &camera, &job.read_files, &job.console)?));
         }
         let write = milliseconds_since(started);
 

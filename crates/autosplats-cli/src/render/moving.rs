@@ -19,7 +19,7 @@ use super::{camera, schedule};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
 use crate::input::Playing;
-use crate::output::check_target;
+use crate::output::{is_written, true_path};
 use crate::progress::{Bar, Notes};
 
 /// Most frames that the camera is placed by.
@@ -52,10 +52,11 @@ pub(super) fn run(
     if film.frames.last.is_some_and(|last| last >= there) {
         job.console.note(has());
     }
+    let camera_file = job.save_camera.as_deref().map(true_path);
     for file in frames.clone().filter_map(|frame| film.file(frame)) {
         job.read_files.check(&file)?;
-        if job.save_camera.as_ref() == Some(&file) {
-            return Err(Failure::usage(format!("{}: two outputs have this name", file.display())));
+        if camera_file.is_some() && camera_file == Some(true_path(&file)) {
+            return Err(Failure::usage(format!("{}: two outputs are this file", file.display())));
         }
     }
     let times = &scene.times[frames.clone()];
@@ -70,8 +71,7 @@ pub(super) fn run(
 
     let camera = scene.settle(job, renderer, &frames)?;
     if let Some(path) = &job.save_camera {
-        check_target(path, &job.read_files, &job.console)?;
-        camera::save(path, &camera, &job.console)?;
+        camera::save(path, &camera, &job.read_files, &job.console)?;
     }
     let bar = Bar::new(&format!("rendering {} frames", shown.len()), &job.console);
     let notes = Notes::new(&bar, &job.inputs.names());
@@ -82,7 +82,7 @@ pub(super) fn run(
         for (number, &(frame, pictures)) in shown.iter().enumerate() {
             bar.tick(number as f32 / shown.len() as f32)?;
             let path = film.file(frame);
-            if film.resume && path.as_ref().is_some_and(|path| path.exists()) {
+            if film.resume && path.as_deref().is_some_and(is_written) {
                 tally.kept += 1;
                 continue;
             }

@@ -146,8 +146,6 @@ fn write_film(
     let failure = |error| Failure::new(Exit::Output, error);
     let mut reports = Vec::new();
     {
-        // The lock makes Ctrl-C wait until the partial film is removed.
-        let _writing = interrupt.writing();
         let mut film = Film::begin(path, style.size, style.rate).map_err(failure)?;
         let mut complete = false;
         for shot in shots {

@@ -14,6 +14,7 @@ mod info;
 #[cfg(feature = "zenoh")]
 mod live_pictures;
 mod normals;
+mod outputs;
 mod real_files;
 mod render;
 mod streams;

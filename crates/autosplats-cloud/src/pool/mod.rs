@@ -20,6 +20,7 @@ use glam::DVec3;
 
 use crate::identity::Identity;
 use crate::merge::GREY;
+use crate::reserve::reserving;
 use crate::{Axes, Error, FieldValues, NodeKey, PointCloud, RelativeValues, ValueOrigin, check_memory};
 
 /// Points in a slot.
@@ -142,13 +143,13 @@ impl PointPool {
         check_memory("the points in memory", bytes)?;
         let full = |_| Error::OutOfMemory { what: "the points in memory".into(), bytes: bytes as usize };
         let mut positions = Vec::new();
-        positions.try_reserve_exact(points).map_err(full)?;
+        reserving(|| positions.try_reserve_exact(points)).map_err(full)?;
         let mut colors = sample.colors().map(|_| Vec::new());
-        colors.iter_mut().try_for_each(|colors| colors.try_reserve_exact(points)).map_err(full)?;
+        reserving(|| colors.iter_mut().try_for_each(|colors| colors.try_reserve_exact(points))).map_err(full)?;
         let mut fields = Vec::new();
         for field in sample.fields() {
             let mut values = Vec::new();
-            values.try_reserve_exact(points).map_err(full)?;
+            reserving(|| values.try_reserve_exact(points)).map_err(full)?;
             let about = RelativeValues::new(&field.values).about();
             fields.push(PoolField { name: field.name.clone(), about, values: FieldValues::F32(values) });
         }

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 pub use self::surface_samples::SurfaceSamples;
 use self::{surface_samples::Place, triangle::Triangle};
-use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, random::Random};
+use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, random::Random, reserve::reserving};
 
 /// Points computed between two checks for cancellation.
 const BLOCK: usize = 1 << 18;
@@ -87,7 +87,7 @@ impl SurfaceSamples {
         let mut places: Vec<Place> = Vec::new();
         let bytes = count.saturating_mul(per_point);
         let full = |_| Error::OutOfMemory { what: format!("{count} points on a surface"), bytes };
-        places.try_reserve_exact(count).map_err(full)?;
+        reserving(|| places.try_reserve_exact(count)).map_err(full)?;
         for start in (0..count).step_by(BLOCK) {
             progress.tick(0.1 + 0.7 * start as f32 / count as f32)?;
             let pieces = (start..count.min(start + BLOCK)).into_par_iter().step_by(PIECE);

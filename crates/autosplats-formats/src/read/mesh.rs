@@ -5,7 +5,7 @@ use std::{
     sync::atomic::{AtomicU32, Ordering},
 };
 
-use autosplats_cloud::{Error, FieldValues, PointCloud};
+use autosplats_cloud::{Error, FieldValues, PointCloud, reserving};
 use rayon::prelude::*;
 
 use super::{
@@ -191,7 +191,8 @@ pub(super) fn weld<K: Hash + Eq + Send>(
             }
             if seen.len() == seen.capacity() {
                 let bytes = seen.len().saturating_mul(size_of::<(K, u32)>());
-                seen.try_reserve(seen.len().max(64)).map_err(|_| Error::OutOfMemory { what: what.into(), bytes })?;
+                let room = reserving(|| seen.try_reserve(seen.len().max(64)));
+                room.map_err(|_| Error::OutOfMemory { what: what.into(), bytes })?;
             }
             let own = *seen.entry(key).or_insert(corner as u32);
             first[corner].store(own, Ordering::Relaxed);

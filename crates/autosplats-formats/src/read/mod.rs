@@ -48,12 +48,11 @@ mod xyz;
 
 use self::job::{Format, Job, MAX_HEADER_LINE};
 pub use self::{
-    depth_image::color::beside as colors_beside,
     describe::{Attribute, Description},
     options::ReadOptions,
     parts::{Parts, open_parts, open_parts_of},
     registry::{
-        check_not_lfs_pointer, describe, describe_bytes, formats, gltf_animation, is_named_as_points, read, read_bytes,
-        read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with,
+        check_not_lfs_pointer, describe, describe_bytes, files_beside, formats, gltf_animation, is_named_as_points,
+        read, read_bytes, read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with,
     },
 };

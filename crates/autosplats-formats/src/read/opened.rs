@@ -8,7 +8,7 @@ use std::{
     time::SystemTime,
 };
 
-use autosplats_cloud::{Error, read_exact_at};
+use autosplats_cloud::{Error, read_exact_at, reserving};
 
 /// A file that is read again and again, and must not change meanwhile.
 pub(super) struct Opened {
@@ -79,8 +79,7 @@ impl Reader<'_> {
     /// Appends bytes of the file to `bytes`.
     pub(super) fn read(&self, range: Range<usize>, bytes: &mut Vec<u8>) -> Result<(), Error> {
         let start = bytes.len();
-        bytes
-            .try_reserve(range.len())
+        reserving(|| bytes.try_reserve(range.len()))
             .map_err(|_| Error::OutOfMemory { what: "a part of the file".into(), bytes: range.len() })?;
         bytes.resize(start + range.len(), 0);
         let at = (self.opened.before + range.start) as u64;

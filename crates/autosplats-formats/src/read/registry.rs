@@ -1,6 +1,6 @@
 //! All formats, and reading a file in whichever it has.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Bytes, Contents, Error, LeftOut, PointCloud, Progress};
 
@@ -196,6 +196,34 @@ pub fn gltf_animation(name: &Path, bytes: &[u8]) -> Result<Option<(f64, usize)>,
 /// Those of [`read`].
 pub fn read_gltf_at(name: &Path, bytes: &[u8], seconds: f64, progress: &dyn Progress) -> Result<Contents, Error> {
     with_job(name, bytes, &ReadOptions::default(), progress, true, |job, _| gltf::read_at(job, Some(seconds)))
+}
+
+/// Files that a file refers to: the buffers and images of a glTF, and the picture that gives a depth image its colours.
+/// Only some of them need to exist.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_formats::files_beside;
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("statue.gltf");
+/// std::fs::write(&path, r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "statue.bin", "byteLength": 9}]}"#)?;
+/// assert_eq!(files_beside(&path), [path.with_file_name("statue.bin")]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[must_use]
+pub fn files_beside(path: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = depth_image::color::beside(path).into_iter().collect();
+    if named(path).is_some_and(|format| format.name == gltf::FORMAT.name)
+        && path.is_file()
+        && let Ok(bytes) = Bytes::open(path)
+    {
+        let linked = with_job(path, &bytes, &ReadOptions::default(), &(), false, |job, _| gltf::linked(job));
+        // A file that cannot be read refers to none.
+        files.extend(linked.unwrap_or_default());
+    }
+    files
 }
 
 /// Reads the header of a file, in milliseconds whatever the file's size. Of formats without a header that states counts

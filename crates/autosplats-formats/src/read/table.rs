@@ -4,7 +4,7 @@ mod settle;
 
 use std::{ops::Range, path::Path};
 
-use autosplats_cloud::{Error, FieldValues, PointCloud};
+use autosplats_cloud::{Error, FieldValues, PointCloud, reserving};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -321,7 +321,6 @@ fn blocks(count: usize) -> impl Iterator<Item = Range<usize>> {
 
 /// Reserves room for `additional` values; `what` names them in the error.
 pub(super) fn reserve<T>(values: &mut Vec<T>, additional: usize, what: &str) -> Result<(), Error> {
-    values
-        .try_reserve(additional)
+    reserving(|| values.try_reserve(additional))
         .map_err(|_| Error::OutOfMemory { what: what.into(), bytes: additional.saturating_mul(size_of::<T>()) })
 }

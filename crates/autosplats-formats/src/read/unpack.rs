@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, io::Read as _, path::Path};
 
-use autosplats_cloud::{Error, Progress, Unmarked, check_memory};
+use autosplats_cloud::{Error, Progress, Unmarked, check_memory, reserving};
 use flate2::bufread::GzDecoder;
 
 /// First bytes of a file that gzip compressed.
@@ -57,7 +57,8 @@ fn decompress(path: &Path, mut rest: &[u8], progress: &dyn Progress) -> Result<(
             if bytes.capacity() - bytes.len() < step {
                 let more = bytes.len().max(step);
                 check_memory(&what, (bytes.len() + more) as u64)?;
-                bytes.try_reserve(more).map_err(|_| Error::OutOfMemory { what: what.clone(), bytes: more })?;
+                let room = reserving(|| bytes.try_reserve(more));
+                room.map_err(|_| Error::OutOfMemory { what: what.clone(), bytes: more })?;
             }
             let read = decoder.by_ref().take(step as u64).read_to_end(&mut bytes).map_err(|error| {
                 let at = whole - decoder.get_ref().len();

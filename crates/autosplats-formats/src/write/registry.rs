@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use autosplats_cloud::{Clouds, Error, Held, PointCloud, Progress, write_whole};
+use autosplats_cloud::{Clouds, Error, Held, Output, PointCloud, Progress, write_whole};
 
 use super::{
     copc, e57,
@@ -18,10 +18,12 @@ pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'stat
     FORMATS.iter().map(|format| (format.name, format.extensions))
 }
 
-/// Writes `cloud` in the format that the extension of `path` names; see [`written_formats`].
+/// Writes `cloud` in the format that the extension of the output's path names; see [`written_formats`]. Returns the
+/// size of the file in bytes.
 ///
 /// A cloud that was read [exactly](crate::ReadOptions::exact) keeps all digits that the format can hold. Losses are
-/// reported by [`Progress::note`]. The file appears complete or not at all, and replaces an existing file.
+/// reported by [`Progress::note`]. The file appears complete or not at all, and replaces an existing file, unless the
+/// [`Output`] says otherwise.
 ///
 /// # Errors
 /// [`Error::UnknownOutput`] if no format has the extension, [`Error::Io`] if the file cannot be written,
@@ -40,8 +42,9 @@ pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'stat
 /// assert_eq!(read(&path, &())?.positions(), cloud.positions());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn write(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result<(), Error> {
-    write_clouds(&Held { name: path, cloud }, path, progress)
+pub fn write<'a>(cloud: &PointCloud, output: impl Into<Output<'a>>, progress: &dyn Progress) -> Result<u64, Error> {
+    let output = output.into();
+    write_clouds(&Held { name: output.path, cloud }, output, progress)
 }
 
 /// Like [`write()`], of points that come in parts. They are read two or three times, and memory needs to hold only a
@@ -64,11 +67,16 @@ pub fn write(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result
 /// assert_eq!(read(&path, &())?.len(), 2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn write_clouds(clouds: &dyn Clouds, path: &Path, progress: &dyn Progress) -> Result<(), Error> {
-    let job = Job { clouds, path, progress };
-    let format = format(path)?;
+pub fn write_clouds<'a>(
+    clouds: &dyn Clouds,
+    output: impl Into<Output<'a>>,
+    progress: &dyn Progress,
+) -> Result<u64, Error> {
+    let output = output.into();
+    let job = Job { clouds, path: output.path, progress };
+    let format = format(output.path)?;
     write_whole(
-        path,
+        output,
         |source| job.io(source),
         |file| {
             (format.write)(&job, file)?;

@@ -29,7 +29,7 @@ mod tests;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use autosplats_cloud::{Axes, Error, PointCloud, Progress};
+use autosplats_cloud::{Axes, Error, PointCloud, Progress, reserving};
 use glam::DVec3;
 
 use self::model::{Model, Points};
@@ -98,7 +98,7 @@ impl Sampler<'_> {
         assert!(whole && start <= end && end <= self.count, "points {range:?} of {}", self.count);
         let count = range.len();
         // A failed reservation becomes an error. The zeroed vectors below would abort the process instead.
-        if Vec::<[u8; 15]>::new().try_reserve_exact(count).is_err() {
+        if reserving(|| Vec::<[u8; 15]>::new().try_reserve_exact(count)).is_err() {
             return Err(self.scene.refuse(self.count, "not enough memory for so many points"));
         }
         let (mut positions, mut colors) = (vec![[0.0; 3]; count], vec![[0; 3]; count]);

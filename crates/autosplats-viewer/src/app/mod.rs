@@ -3,6 +3,9 @@
 mod perform;
 mod picture;
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use eframe::egui;
 
 use crate::Options;
@@ -15,6 +18,8 @@ pub(crate) struct App {
     pub(crate) session: Session,
     pub(crate) view: View,
     pub(crate) ui: Ui,
+    /// Why the session could not be written at the end.
+    pub(crate) unsaved: Rc<RefCell<Option<String>>>,
 }
 
 impl App {
@@ -24,7 +29,7 @@ impl App {
         let messages = ui.messages.sender();
         let session = Session::new(options.state, options.watch, recent, options.trees, messages.clone(), context);
         let view = View::new(look, session.trees.handle(), messages, context);
-        let mut app = Self { session, view, ui };
+        let mut app = Self { session, view, ui, unsaved: Rc::default() };
         if let Some(backend) = options.backend {
             app.view.look.backend = backend;
         }
@@ -112,7 +117,7 @@ impl eframe::App for App {
         if let Some(path) = &self.session.file
             && let Err(error) = State::of(&self.session, &self.view).write(path)
         {
-            eprintln!("error: {error}");
+            *self.unsaved.borrow_mut() = Some(error);
         }
     }
 }

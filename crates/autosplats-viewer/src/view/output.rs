@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use autosplats::Image;
+use autosplats::cloud::{Existing, Output};
 use autosplats_output::{PictureFormat, write_picture};
 
 use super::View;
@@ -14,7 +15,7 @@ impl View {
     /// Hands a picture to its goal. `range` holds the ends of its colour map.
     pub(crate) fn photographed(&mut self, picture: Image, range: Option<[f64; 2]>, goal: Goal) {
         match goal {
-            Goal::File(path) => self.save_picture(picture, path),
+            Goal::File(path, existing) => self.save_picture(picture, path, existing),
             Goal::Film(number) => {
                 // A stopped film may have left a picture in work.
                 if let Some(recording) = self.recording.as_mut().filter(|recording| recording.number == number) {
@@ -25,11 +26,12 @@ impl View {
     }
 
     /// Writes a picture on a thread of its own and reports the result.
-    pub(crate) fn save_picture(&self, picture: Image, path: PathBuf) {
+    pub(crate) fn save_picture(&self, picture: Image, path: PathBuf, existing: Existing) {
         let messages = self.messages.clone();
         spawn("picture", move || {
             let format = PictureFormat::of(&path).unwrap_or(PictureFormat::Png);
-            let written = files::write(&path, |writer| write_picture(&picture, format, true, writer));
+            let written =
+                files::write(Output { path: &path, existing }, |writer| write_picture(&picture, format, true, writer));
             messages.result(match written {
                 Ok(()) => Ok(format!("{} was written", path.display())),
                 Err(error) => Err(format!("{}: {error}", path.display())),

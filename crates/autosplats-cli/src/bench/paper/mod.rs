@@ -161,7 +161,7 @@ pub(crate) fn run(args: &PaperArgs, console: &Console) -> Result<(), Failure> {
     let pictures = out.join(format!("results{suffix}"));
     create_folder(&pictures)?;
     let page = out.join(format!("RESULTS{suffix}.md"));
-    check_target(&page, &ReadFiles::default(), console)?;
+    check_target(&page, &ReadFiles::default())?;
 
     let mut journal = Journal::open(&pictures.join("measurements.json"), *fresh, console)?;
     let mut renderers = Renderers::new();

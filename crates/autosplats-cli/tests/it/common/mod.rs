@@ -63,6 +63,8 @@ impl Folder {
     }
 
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
+        #[cfg(unix)]
+        hear_signals();
         let mut command = Command::new(env!("CARGO_BIN_EXE_autosplats"));
         command.current_dir(self.0.path()).args(arguments).stdin(Stdio::null());
         // Prevents tests from opening a window by mistake.
@@ -110,6 +112,22 @@ impl Folder {
         }
         assert_eq!(self.list(), before, "{arguments:?} leaves nothing behind");
     }
+}
+
+/// Makes started commands hear signals, which would inherit that the tests ignore them, as programs in the background
+/// of a script do. A signal that this process handles has its default in those that it starts.
+#[cfg(unix)]
+fn hear_signals() {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+    use signal_hook::flag::{register, register_conditional_default};
+    use std::sync::{Arc, Once, atomic::AtomicBool};
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        for signal in [SIGINT, SIGQUIT, SIGTERM] {
+            register_conditional_default(signal, Arc::new(AtomicBool::new(true))).expect("it can be handled");
+        }
+        register(SIGHUP, Arc::default()).expect("it can be handled");
+    });
 }
 
 /// Position of point `index` of the sphere.

@@ -19,7 +19,7 @@ const EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "ppm"];
 const MAX_BYTES: u64 = 1 << 28;
 
 /// The colour image of a depth image, found by name: `depth_1.pgm` and `color_1.png`, `depth/1.png` and `rgb/1.jpg`.
-pub fn beside(path: &Path) -> Option<PathBuf> {
+pub(in crate::read) fn beside(path: &Path) -> Option<PathBuf> {
     let stem = path.file_stem()?.to_str()?;
     let folder = path.parent()?;
     for word in WORDS {

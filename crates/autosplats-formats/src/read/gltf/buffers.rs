@@ -1,12 +1,14 @@
 //! The buffers of a glTF: in the file, in its text, or in files beside it.
 
+use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
 use autosplats_cloud::{Bytes, Error, excerpt, guard};
 use base64::{Engine as _, alphabet, engine};
+use serde::Deserialize;
 
 use super::super::Job;
-use super::json::Root;
+use super::json::{Container, Root};
 
 /// Base64 with optional padding, which some programs leave out.
 const BASE64: engine::GeneralPurpose = engine::GeneralPurpose::new(
@@ -97,6 +99,35 @@ fn decode(job: &Job<'_>, place: &str, uri: &str) -> Result<Vec<u8>, Error> {
     decoded.map_err(|what| job.malformed(place, format!("{what}; export the file again")))
 }
 
+/// What a glTF has in other files.
+#[derive(Deserialize)]
+struct Links<'a> {
+    #[serde(default, borrow)]
+    buffers: Vec<Link<'a>>,
+    #[serde(default, borrow)]
+    images: Vec<Link<'a>>,
+}
+
+#[derive(Deserialize)]
+struct Link<'a> {
+    #[serde(borrow)]
+    uri: Option<Cow<'a, str>>,
+}
+
+/// Paths of the files that hold the buffers and images of a glTF.
+pub(in super::super) fn linked(job: &Job<'_>) -> Result<Vec<PathBuf>, Error> {
+    let container = Container::open(job)?;
+    let links = guard(|| serde_json::from_slice::<Links<'_>>(container.json).map_err(|error| error.to_string()));
+    let Links { buffers, images } = links.map_err(|what| job.malformed("JSON", what))?;
+    let uris = buffers.iter().chain(&images).filter_map(|link| link.uri.as_deref());
+    let decoded = uris.filter(|uri| !uri.starts_with("data:")).map(percent_decoded);
+    Ok(decoded.map(|name| folder(job).join(&*String::from_utf8_lossy(&name))).collect())
+}
+
+fn folder<'a>(job: &Job<'a>) -> &'a Path {
+    job.path.parent().unwrap_or(Path::new(""))
+}
+
 /// Opens a file in the same folder or below it. Other places are never opened, whatever the file says.
 fn beside(job: &Job<'_>, place: &str, uri: &str) -> Result<Bytes, Error> {
     let decoded = percent_decoded(uri);
@@ -110,7 +141,7 @@ fn beside(job: &Job<'_>, place: &str, uri: &str) -> Result<Bytes, Error> {
             format!("it is at '{}', and only files beside this one are read; put it there", excerpt(uri.as_bytes()));
         return Err(job.malformed(place, what));
     }
-    let path: PathBuf = job.path.parent().unwrap_or(Path::new("")).join(relative);
+    let path: PathBuf = folder(job).join(relative);
     let io = |source| Error::Io { path: path.clone(), source };
     if !std::fs::metadata(&path).map_err(io)?.is_file() {
         return Err(job.malformed(place, format!("'{}' is not a file", excerpt(uri.as_bytes()))));

@@ -256,7 +256,7 @@ pub(super) struct Buffer<'a> {
 /// The JSON and the binary chunk of a file of either kind.
 pub(super) struct Container<'a> {
     pub(super) binary: bool,
-    json: &'a [u8],
+    pub(super) json: &'a [u8],
     pub(super) chunk: Option<&'a [u8]>,
 }
 

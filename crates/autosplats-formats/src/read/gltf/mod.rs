@@ -15,7 +15,6 @@ use autosplats_cloud::{Axes, Contents, Crs, Error, FieldValues, Unit, normal_mat
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-pub(super) use self::animation::animation;
 use self::{
     accessor::{Values, part},
     animation::Pose,
@@ -23,6 +22,7 @@ use self::{
     json::{Attributes, Container, Root},
     plan::{FAN, PlacedPrimitive, Plan, STRIP, TRIANGLES},
 };
+pub(super) use self::{animation::animation, buffers::linked};
 use super::{
     Attribute, Description, Format, Job,
     mesh::{self, Faces},

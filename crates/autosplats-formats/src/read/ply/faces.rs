@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use autosplats_cloud::{Error, excerpt};
+use autosplats_cloud::{Error, excerpt, reserving};
 
 use super::super::{
     Job, lines,
@@ -103,7 +103,7 @@ impl Reader<'_> {
                 if index == self.list {
                     let corner = |raw| corner(raw, big_endian, property.scalar);
                     corners.clear();
-                    corners.try_reserve(len).map_err(|_| Error::OutOfMemory {
+                    reserving(|| corners.try_reserve(len)).map_err(|_| Error::OutOfMemory {
                         what: "the corners of a face".into(),
                         bytes: len.saturating_mul(8),
                     })?;

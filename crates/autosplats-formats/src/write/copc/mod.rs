@@ -41,7 +41,7 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Error, Held, Part as PartOf, PointFilter, Progress, Spill, check_disk, lock, usual_memory, write_whole,
+    Error, Held, Output, Part as PartOf, PointFilter, Progress, Spill, check_disk, lock, usual_memory, write_whole,
 };
 use glam::DVec3;
 use rayon::prelude::*;
@@ -96,32 +96,36 @@ pub struct TreeSummary {
     pub points: u64,
     /// Number of nodes.
     pub nodes: usize,
+    /// Size of the file, in bytes.
+    pub bytes: u64,
     /// Largest size of the temporary file, in bytes.
     pub temporary: u64,
 }
 
 /// Makes one COPC file of all points of the inputs. The file appears complete or not at all, and replaces an existing
-/// file. Nothing else is left, whatever happens.
+/// file, unless the [`Output`] says otherwise.
 ///
 /// # Errors
 /// Those of reading and writing; [`Error::Unsupported`] for inputs that cannot be joined without loss;
 /// [`Error::OutOfMemory`] if `memory` does not suffice; and [`Error::Cancelled`] if `progress` says so.
-pub fn write_tree(
+pub fn write_tree<'a>(
     inputs: Vec<TreeInput<'_>>,
-    path: &Path,
+    output: impl Into<Output<'a>>,
     options: &TreeOptions,
     progress: &dyn Progress,
 ) -> Result<TreeSummary, Error> {
+    let output = output.into();
+    let path = output.path;
     let mut summary = TreeSummary::default();
-    let made = write_whole(
-        path,
+    let bytes = write_whole(
+        output,
         |source| Error::Io { path: path.into(), source },
         |file| {
             summary = make(inputs, path, options, progress, file)?;
             progress.tick(1.0)
         },
-    );
-    made.map(|()| summary)
+    )?;
+    Ok(TreeSummary { bytes, ..summary })
 }
 
 /// Fills the file.
@@ -308,7 +312,7 @@ impl Making<'_> {
         let temporary = spill.bytes();
         let (points, nodes) = file.finish()?;
         debug_assert_eq!(points, total, "every point is written once");
-        Ok(TreeSummary { points, nodes, temporary })
+        Ok(TreeSummary { points, nodes, temporary, ..TreeSummary::default() })
     }
 
     /// Takes the next parts that fit into memory together.

@@ -225,15 +225,23 @@ fn padded<const LEN: usize>(text: &str) -> [u8; LEN] {
     bytes
 }
 
-/// Day of the year, counted from 1, and year.
+/// Day of the year, counted from 1, and year of the file's making. The environment variable `SOURCE_DATE_EPOCH`, in
+/// seconds since 1970, stands for the clock, so that the same file can be made on any day.
 pub(in crate::write) fn today() -> (u16, u16) {
-    let mut days = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() / 86_400);
+    let told = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.trim().parse().ok());
+    let clock = || SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    day_and_year(told.unwrap_or_else(clock))
+}
+
+/// Day of the year, counted from 1, and year, from seconds since 1970. At most the last year that LAS can hold.
+fn day_and_year(seconds: u64) -> (u16, u16) {
+    let mut days = seconds / 86_400;
     let mut year: u16 = 1970;
     loop {
         let leap = year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
         let length = if leap { 366 } else { 365 };
-        if days < length {
-            return (days as u16 + 1, year);
+        if days < length || year == u16::MAX {
+            return (days.min(length - 1) as u16 + 1, year);
         }
         days -= length;
         year += 1;

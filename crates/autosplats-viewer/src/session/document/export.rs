@@ -7,10 +7,10 @@ use std::{
 };
 
 use autosplats::cloud::{
-    Error, PointCloud, Progress, Scan, Unit, check_memory,
+    Error, Existing, Output, PointCloud, Progress, Scan, Unit, check_memory,
     glam::{DMat4, DQuat},
 };
-use autosplats_formats::{Part, ReadOptions, check_writable, write};
+use autosplats_formats::{Part, ReadOptions, check_writable, files_beside, write};
 use autosplats_sources::read_tree;
 
 use super::{ClipBox, Document, Layer, LayerId, LayerTree, bounds::box_of, shown::points_where};
@@ -133,7 +133,8 @@ pub(crate) fn export(
             Cow::Owned(PointCloud::merged(&clouds.iter().map(|cloud| (&**cloud, DMat4::IDENTITY)).collect::<Vec<_>>()))
         }
     };
-    write(&cloud, path, progress)?;
+    let existing = if replace < Replace::Files { Existing::Keep } else { Existing::Replace };
+    write(&cloud, Output { path, existing }, progress)?;
     Ok(Exported { points: cloud.len() })
 }
 
@@ -271,8 +272,8 @@ fn check_target(document: &Document, path: &Path, replace: Replace) -> Result<()
         return if there { Err(ExportError::Exists { path: path.into() }) } else { Ok(()) };
     };
     let input = document.layers.iter().find(|layer| {
-        let path = layer.path.as_ref().and_then(|path| path.canonicalize().ok());
-        path.is_some_and(|path| path == target)
+        let beside = layer.path.iter().flat_map(|path| files_beside(path));
+        layer.path.iter().cloned().chain(beside).any(|path| path.canonicalize().is_ok_and(|path| path == target))
     });
     match input {
         Some(layer) if replace < Replace::Inputs => {

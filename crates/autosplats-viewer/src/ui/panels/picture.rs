@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-use autosplats::cloud::check_memory;
+use autosplats::cloud::{Existing, check_memory};
 use autosplats::{BYTES_PER_PIXEL, MAX_SIDE};
 use autosplats_output::PictureFormat;
 use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile, Write};
+use crate::files::is_there;
 use crate::session::Session;
 use crate::view::{Goal, Task, View};
 
@@ -20,7 +21,7 @@ pub(crate) struct PictureDialog {
     /// Whether to save the whole window, menus included.
     window: bool,
     /// The expected screenshot of the window, and its file.
-    expected: Option<(Receiver<Arc<egui::ColorImage>>, PathBuf)>,
+    expected: Option<(Receiver<Arc<egui::ColorImage>>, PathBuf, Existing)>,
 }
 
 impl Default for PictureDialog {
@@ -72,7 +73,8 @@ impl PictureDialog {
             write = self.target.show(ui, &words, entered, problem);
         });
         let Some(Write { path, replace, .. }) = write else { return };
-        if !replace && path.exists() {
+        let existing = if replace { Existing::Replace } else { Existing::Keep };
+        if !replace && is_there(&path) {
             self.target.refuse(&path, "This file exists already", true);
             return;
         }
@@ -82,22 +84,22 @@ impl PictureDialog {
             context.request_screenshot(move |image| {
                 let _ = sender.send(image);
             });
-            self.expected = Some((receiver, path));
+            self.expected = Some((receiver, path, existing));
         } else {
             let wish = Box::new(view.wish(session, self.size, false));
-            view.render.task(Task::Photograph { wish, goal: Goal::File(path) });
+            view.render.task(Task::Photograph { wish, goal: Goal::File(path, existing) });
         }
     }
 
     /// Writes the screenshot of the window once it arrives.
     fn arrived(&mut self, view: &View) {
-        let Some(image) = self.expected.as_ref().and_then(|(receiver, _)| receiver.try_recv().ok()) else {
+        let Some(image) = self.expected.as_ref().and_then(|(receiver, ..)| receiver.try_recv().ok()) else {
             return;
         };
-        let Some((_, path)) = self.expected.take() else { return };
+        let Some((_, path, existing)) = self.expected.take() else { return };
         let [width, height] = image.size.map(|side| side as u32);
         let pixels = image.pixels.iter().map(egui::Color32::to_srgba_unmultiplied).collect();
         let picture = autosplats::Image { width, height, pixels, linear: Vec::new() };
-        view.save_picture(picture, path);
+        view.save_picture(picture, path, existing);
     }
 }

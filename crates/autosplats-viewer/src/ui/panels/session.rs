@@ -5,6 +5,7 @@ use std::path::Path;
 use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile};
+use crate::files::is_there;
 use crate::session::Session;
 use crate::view::{State, View};
 
@@ -41,7 +42,7 @@ impl SessionDialog {
             write = self.target.show(ui, &words, entered, folder);
         });
         let Some(write) = write else { return };
-        if !write.replace && write.path.exists() {
+        if !write.replace && is_there(&write.path) {
             self.target.refuse(&write.path, "This file exists already", true);
             return;
         }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use autosplats::Image;
+use autosplats::cloud::Existing;
 use autosplats::cloud::glam::DVec3;
 
 use super::RenderRequest;
@@ -55,8 +56,8 @@ pub(crate) enum Task {
 
 /// What a rendered picture is for.
 pub(crate) enum Goal {
-    /// A file.
-    File(PathBuf),
+    /// A file, and what happens to one that is there.
+    File(PathBuf, Existing),
     /// A picture of the film with this number.
     Film(u64),
 }
