@@ -23,7 +23,7 @@ const VOXEL_BYTES: u64 = 32;
 /// Reads the inputs and writes the file.
 pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
     let ConvertArgs { paths, input, force, part, thinning, .. } = args;
-    let (inputs, output) = Inputs::with_output(paths, args.output.as_deref(), input)?;
+    let (inputs, output) = Inputs::with_output(paths, args.output.as_deref(), input, part)?;
     check_cloud_target(&output, *force, &inputs.files([]), console)?;
     check_room(&args.room)?;
     if tree::is_tree(&output) {

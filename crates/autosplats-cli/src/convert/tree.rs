@@ -49,6 +49,7 @@ pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: &Path, console: &
         bounds: args.part.bounds,
         keep: args.input.reading.keep.clone(),
         keep_no_returns: args.input.reading.keep_no_returns,
+        whole: !args.part.salvage,
     };
     let bar = Bar::on_file("building", output, console);
     let _writing = console.interrupt().writing();

@@ -48,6 +48,7 @@ mod xyz;
 
 use self::job::{Format, Job, MAX_HEADER_LINE};
 pub use self::{
+    columns::check_columns,
     depth_image::color::beside as colors_beside,
     describe::{Attribute, Description},
     options::ReadOptions,
