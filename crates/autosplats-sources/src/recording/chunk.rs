@@ -78,6 +78,9 @@ const MAX_BYTES: u64 = 1 << 30;
 /// many without content would take forever.
 const MIN_STREAM_BYTES: usize = 1 << 12;
 
+/// Streams that may be shorter.
+const FREE_STREAMS: usize = 16;
+
 /// Maximum window of a frame in bytes. Large frames may ask for more.
 const MAX_WINDOW_BYTES: u64 = 16 << 20;
 
@@ -148,11 +151,42 @@ impl<'a, D: Decoder<'a>> Read for Streams<'a, D> {
             if self.data.is_empty() {
                 return Ok(0);
             }
-            if self.started > self.unpacked / MIN_STREAM_BYTES {
+            if self.started > FREE_STREAMS + self.unpacked / MIN_STREAM_BYTES {
                 return Err(std::io::Error::other("it has many compressed streams with nothing in them"));
             }
             self.started += 1;
             self.stream = Some(Box::new(D::start(self.data)?));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chunk(compression: &str, data: &[u8], size: u64) -> Result<usize, String> {
+        let compression = compression.to_owned();
+        let chunk = Chunk { data: 0..data.len(), size, crc: 0, compression, cut: None };
+        unpack(data, &chunk).map(|content| content.len())
+    }
+
+    #[test]
+    fn chunks_unpack_to_what_points_could_be() {
+        let packed = vec![7; 1 << 20];
+        for (size, is_believed) in [(MAX_RATIO << 20, true), ((MAX_RATIO << 20) + 1, false), (u64::MAX, false)] {
+            let told = chunk("zstd", &packed, size).expect_err("it is no stream");
+            assert_eq!(!told.contains("is not believed"), is_believed, "{size}: {told}");
+        }
+        let told = chunk("bz2", &[0; 99], PLAUSIBLE_BYTES + 1).expect_err("99 bytes");
+        assert!(told.contains("its 99 bytes claim to unpack to 67108865, which is not believed"), "{told}");
+    }
+
+    #[test]
+    fn streams_without_content_end() {
+        let empty = b"BZh9\x17\x72\x45\x38\x50\x90\0\0\0\0";
+        let told = chunk("bz2", &empty.repeat(1 << 20), 5).expect_err("nothing is in it");
+        assert!(told.contains("many compressed streams with nothing in them"), "{told}");
+        let few = chunk("bz2", &empty.repeat(3), 5).expect_err("too little is in it");
+        assert!(few.contains("unpacks to 0 bytes but claims 5"), "{few}");
     }
 }

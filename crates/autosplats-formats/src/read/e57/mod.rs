@@ -85,7 +85,8 @@ fn scans<'a, T>(
 ) -> Result<Vec<T>, Error> {
     root.notes.iter().for_each(|note| job.note(note));
     if pages.cut_off() {
-        job.loss(&format!("byte {}", job.bytes.len()), "the file is cut off here, and what is behind is lost")?;
+        let end = format!("byte {}", job.bytes.len());
+        job.loss(&end, format!("the file is cut off at {end}"))?;
     }
     let mut left = job.bytes.len();
     let mut done = 0.0;
