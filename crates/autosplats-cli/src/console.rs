@@ -24,7 +24,7 @@ use crate::interrupt::Interrupt;
 pub struct Console {
     streams: Arc<Streams>,
     interrupt: Interrupt,
-    /// Whether only errors are printed on the stream for messages.
+    /// Whether only errors and losses are printed on the stream for messages.
     quiet: bool,
 }
 
@@ -68,7 +68,7 @@ impl Console {
         || !self.interrupt.requested()
     }
 
-    /// The same console; `quiet` leaves out all messages but errors.
+    /// The same console; `quiet` leaves out all messages but errors and losses.
     pub(crate) fn quiet(&self, quiet: bool) -> Self {
         Self { quiet: self.quiet || quiet, ..self.clone() }
     }
@@ -123,6 +123,11 @@ impl Console {
     /// Tells people what they may not expect, unless quiet.
     pub(crate) fn note(&self, note: impl Display) {
         self.tell(format_args!("note: {note}"));
+    }
+
+    /// Tells people what their input has lost, also if quiet.
+    pub(crate) fn warn(&self, loss: impl Display) {
+        self.message(format_args!("warning: {loss}"));
     }
 
     /// Tells people an error.

@@ -1,10 +1,9 @@
 //! `autosplats doctor`: reports what this machine can do and tests the program on it.
 
-use std::fs::read_to_string;
 use std::time::Instant;
 
 use autosplats::{AdapterSummary, Backend as BackendChoice, Frame, Renderer, Settings, adapters};
-use autosplats_cloud::{Draft, available_memory};
+use autosplats_cloud::{Draft, available_memory, total_memory};
 use autosplats_formats::{formats, read, write, written_formats};
 use autosplats_scenes::Scene;
 use pulp::{Arch, Simd, WithSimd};
@@ -346,15 +345,6 @@ fn simd_used() -> (&'static str, usize) {
         _ => "vector instructions",
     };
     (name, lanes)
-}
-
-/// Memory of the machine, or of the container around the program, in bytes.
-fn total_memory() -> Option<u64> {
-    let meminfo = read_to_string("/proc/meminfo").ok()?;
-    let line = meminfo.lines().find(|line| line.starts_with("MemTotal:"))?;
-    let total = line.split_whitespace().nth(1)?.parse::<u64>().ok()?.checked_mul(1024)?;
-    let limit = read_to_string("/sys/fs/cgroup/memory.max").ok().and_then(|text| text.trim().parse().ok());
-    Some(limit.map_or(total, |limit: u64| total.min(limit)))
 }
 
 fn gigabytes(bytes: u64) -> String {

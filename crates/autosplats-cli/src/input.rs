@@ -12,14 +12,14 @@ use std::time::Duration;
 
 use autosplats_cloud::glam::{DMat4, DVec3};
 use autosplats_cloud::{Error, PointCloud, PointFilter, Progress, check_memory, sample_surface};
-use autosplats_formats::{ReadOptions, read_mesh};
+use autosplats_formats::{ReadOptions, check_columns, read_mesh};
 use autosplats_scenes::{SCENE_PREFIX, Scene};
 use autosplats_sources::{Input, LatestOptions, Live, PlayOptions, Player, Source, beginnings};
 use rayon::prelude::*;
 
 use self::distant::{note_distant_inputs, world_box};
 use self::pose::read_pose;
-use crate::args::{InputArgs, PlayingArgs, ReadingArgs};
+use crate::args::{InputArgs, PartArgs, PlayingArgs, ReadingArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::output::{ReadFiles, folder_of};
@@ -100,6 +100,7 @@ impl Inputs {
         if reading.columns.is_some() && list.iter().all(|input| matches!(input.source, Source::Scene(..))) {
             return Err(Failure::usage("--columns: no input is a file; generated scenes have no columns"));
         }
+        reading.columns.as_deref().map_or(Ok(()), check_columns).map_err(Failure::usage)?;
         let mut files = Vec::new();
         for pose in poses {
             let (place, file) = posed(names, pose).ok_or_else(|| {
@@ -122,11 +123,12 @@ impl Inputs {
         paths: &[String],
         output: Option<&Path>,
         args: &InputArgs,
+        part: &PartArgs,
     ) -> Result<(Self, PathBuf), Failure> {
         match (paths, output) {
-            (inputs, Some(output)) => Ok((Self::parse(inputs, args)?.exactly(), output.into())),
+            (inputs, Some(output)) => Ok((Self::parse(inputs, args)?.to_write(part), output.into())),
             ([inputs @ .., output], None) if !inputs.is_empty() => {
-                Ok((Self::parse(inputs, args)?.exactly(), output.into()))
+                Ok((Self::parse(inputs, args)?.to_write(part), output.into()))
             }
             _ => Err(Failure::usage(format!("{}: the name of the file to write is missing", paths.join(" ")))),
         }
@@ -145,9 +147,11 @@ impl Inputs {
         self
     }
 
-    /// Reads all digits, for writing the points again.
-    fn exactly(mut self) -> Self {
-        self.list.iter_mut().for_each(|input| input.options.exact = true);
+    /// Reads all digits, for writing the points again, and only whole inputs, unless the user takes what is left.
+    fn to_write(mut self, part: &PartArgs) -> Self {
+        for input in &mut self.list {
+            (input.options.exact, input.options.whole) = (true, !part.salvage);
+        }
         self
     }
 
@@ -320,8 +324,22 @@ impl Inputs {
             let boxes: Vec<[DVec3; 2]> = clouds.par_iter().map(world_box).collect();
             note_distant_inputs(&boxes, |at, note| parts[at].note(note));
         }
-        Ok(PointCloud::merge(clouds))
+        let finite = |cloud: &PointCloud| cloud.positions().par_iter().filter(|place| is_finite(place)).count();
+        let placed = clouds.iter().any(|(_, world_from_input)| *world_from_input != DMat4::IDENTITY);
+        let before = if placed { clouds.iter().map(|(cloud, _)| finite(cloud)).sum() } else { 0 };
+        let merged = PointCloud::merge(clouds);
+        let after = if placed { finite(&merged) } else { 0 };
+        if after < before {
+            let lost = before - after;
+            let why = format!("--pose moves {lost} of {before} points further than numbers reach");
+            return Err(Failure::new(Exit::Input, format!("{}: {why}; correct the pose", self.names())));
+        }
+        Ok(merged)
     }
+}
+
+fn is_finite(position: &[f32; 3]) -> bool {
+    position.iter().all(|along| along.is_finite())
 }
 
 /// Parses `INPUT=FILE` into the index of the input and the file. INPUT is an input's name, or the last part of the name

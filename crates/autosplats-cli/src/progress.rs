@@ -1,13 +1,13 @@
 //! Progress on standard error: only on a terminal, and only for tasks of more than half a second.
 
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use autosplats_cloud::Progress;
+use autosplats_cloud::{Progress, lock};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::console::{Console, shown};
@@ -51,8 +51,11 @@ impl Bar {
         bar
     }
 
-    fn tell(&self, subject: &str, note: &str) {
-        self.bar.suspend(|| self.console.note(format_args!("{subject}: {note}")));
+    fn tell(&self, subject: &str, note: &Note) {
+        self.bar.suspend(|| match note {
+            Note::Note(note) => self.console.note(format_args!("{subject}: {note}")),
+            Note::Loss(loss) => self.console.warn(format_args!("{subject}: {loss}")),
+        });
     }
 
     /// Returns one of `parts` equal parts of this task, which reports on an input.
@@ -103,8 +106,19 @@ impl Progress for Bar {
     }
 
     fn note(&self, note: &str) {
-        self.tell(&self.subject, note);
+        self.tell(&self.subject, &Note::Note(note.into()));
     }
+
+    fn loss(&self, loss: &str) {
+        self.tell(&self.subject, &Note::Loss(loss.into()));
+    }
+}
+
+/// What people are told about an input.
+enum Note {
+    Note(String),
+    /// What is lost, which is told in any case.
+    Loss(String),
 }
 
 /// Notes of a part of a task on one input. The part's progress is ignored.
@@ -122,9 +136,15 @@ impl<'a> Notes<'a> {
 
     /// Prints a note.
     pub(crate) fn tell(&self, note: &str) {
+        self.print(Note::Note(note.into()));
+    }
+
+    fn print(&self, note: Note) {
         match self.told.fetch_add(1, Ordering::Relaxed) {
-            told if told < MAX_NOTES => self.bar.tell(&self.subject, note),
-            MAX_NOTES => self.bar.tell(&self.subject, "further notes on this input are omitted"),
+            told if told < MAX_NOTES => self.bar.tell(&self.subject, &note),
+            MAX_NOTES => {
+                self.bar.tell(&self.subject, &Note::Note("further notes on this input are omitted".into()));
+            }
             _ => {}
         }
     }
@@ -140,6 +160,10 @@ impl Progress for Notes<'_> {
     fn note(&self, note: &str) {
         self.tell(note);
     }
+
+    fn loss(&self, loss: &str) {
+        self.print(Note::Loss(loss.into()));
+    }
 }
 
 /// Progress of one of several parallel parts of a task, on one bar.
@@ -150,7 +174,7 @@ pub(crate) struct InputProgress<'a> {
     /// Steps of the bar that this part has added.
     done: AtomicU64,
     /// Notes of this part, printed at its end so that the notes of several parts do not mix.
-    notes: Mutex<Vec<String>>,
+    notes: Mutex<Vec<Note>>,
 }
 
 impl Progress for InputProgress<'_> {
@@ -165,13 +189,17 @@ impl Progress for InputProgress<'_> {
     }
 
     fn note(&self, note: &str) {
-        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.into());
+        lock(&self.notes).push(Note::Note(note.into()));
+    }
+
+    fn loss(&self, loss: &str) {
+        lock(&self.notes).push(Note::Loss(loss.into()));
     }
 }
 
 impl Drop for InputProgress<'_> {
     fn drop(&mut self) {
-        for note in self.notes.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        for note in lock(&self.notes).iter() {
             self.bar.tell(&self.subject, note);
         }
     }

@@ -5,6 +5,7 @@ use std::error::Error as _;
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::exit::{Exit, Failure};
+use crate::values::MAX_THREADS;
 
 /// Runs `work` with `count` threads, or one per core.
 ///
@@ -37,9 +38,33 @@ pub(crate) fn start_threads(count: Option<u16>) -> Result<bool, Failure> {
 
 fn pool(count: Option<u16>) -> ThreadPoolBuilder {
     // 0 means one per core.
-    ThreadPoolBuilder::new().num_threads(count.map_or(0, usize::from))
+    ThreadPoolBuilder::new().num_threads(usize::from(count.or_else(bounded).unwrap_or(0)))
+}
+
+/// The most threads, if the environment asks the crate of threads for more. `None` leaves the number to the crate.
+fn bounded() -> Option<u16> {
+    // As the crate reads it, its older name included.
+    let asked = ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"].iter().find_map(|name| std::env::var(name).ok());
+    beyond(&asked?)
+}
+
+fn beyond(asked: &str) -> Option<u16> {
+    asked.parse::<usize>().ok().filter(|&count| count > usize::from(MAX_THREADS)).map(|_| MAX_THREADS)
 }
 
 fn failure(error: ThreadPoolBuildError) -> Failure {
     Failure::new(Exit::Memory, format!("cannot start the threads: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_environment_cannot_ask_for_any_number_of_threads() {
+        assert_eq!(beyond("100000"), Some(MAX_THREADS), "too many");
+        for plain in ["1024", "2", "0", "", "-1", "many"] {
+            assert_eq!(beyond(plain), None, "{plain} is left to the crate");
+        }
+    }
 }

@@ -89,6 +89,16 @@ impl FirstRadius {
     }
 }
 
+/// Parses the number of neighbours of a normal.
+pub(crate) fn normal_neighbors(text: &str) -> Result<u32, String> {
+    text.parse().ok().filter(|k| (3..=1024).contains(k)).ok_or("must be a whole number within 3 to 1024".into())
+}
+
+/// Parses a gap factor.
+pub(crate) fn gap_factor(text: &str) -> Result<f32, String> {
+    number(text).filter(|factor: &f32| *factor > 1.0).ok_or("must be a number above 1 and below 3e38".into())
+}
+
 /// A range of frames, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FrameRange {
@@ -210,10 +220,13 @@ pub(crate) fn step(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|step| *step > 0).ok_or_else(|| "must be a whole number above 0".into())
 }
 
-/// Parses a number of threads, 1 to 1024.
+/// Most threads. More take seconds to start and are no faster.
+pub(crate) const MAX_THREADS: u16 = 1024;
+
+/// Parses a number of threads.
 pub(crate) fn threads(text: &str) -> Result<u16, String> {
-    let count = text.parse().ok().filter(|count| (1..=1024).contains(count));
-    count.ok_or_else(|| "must be a number from 1 to 1024; without --threads there is one per core".into())
+    let count = text.parse().ok().filter(|count| (1..=MAX_THREADS).contains(count));
+    count.ok_or_else(|| format!("must be a number from 1 to {MAX_THREADS}; without --threads there is one per core"))
 }
 
 /// Parses a number above 0.

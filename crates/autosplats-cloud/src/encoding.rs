@@ -2,10 +2,13 @@
 
 use std::{borrow::Cow, path::Path};
 
-use crate::{Error, check_memory};
+use crate::{Error, check_memory, read_small};
 
 /// Byte order mark of UTF-8.
 const MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Largest text file, in bytes: cameras, poses and sessions have a few kilobytes.
+const MAX_TEXT: u64 = 64 << 20;
 
 /// Bytes after a mark that are inspected, an even number.
 const SAMPLE: usize = 1 << 10;
@@ -84,10 +87,12 @@ fn is_utf16_text(sample: &[u8], number: fn([u8; 2]) -> u16) -> bool {
 /// Reads a text file of any encoding that [`Unmarked`] knows.
 ///
 /// # Errors
-/// Those of the operating system, and an error of the kind `InvalidData` if the file is not text.
+/// Those of the operating system; of the kind `InvalidData` if the file is not text, `FileTooLarge` if it has more than
+/// 64 MiB, and `InvalidInput` for a device, which has no end.
 pub fn read_text(path: &Path) -> std::io::Result<String> {
-    let bytes = std::fs::read(path)?;
-    let text = Unmarked::of(&bytes).map_err(std::io::Error::other)?.bytes.into_owned();
+    let bytes = read_small(path, MAX_TEXT)?;
+    let full = |error| std::io::Error::new(std::io::ErrorKind::OutOfMemory, error);
+    let text = Unmarked::of(&bytes).map_err(full)?.bytes.into_owned();
     String::from_utf8(text).map_err(|_| std::io::Error::new(std::io::ErrorKind::InvalidData, "this is not UTF-8 text"))
 }
 

@@ -1,49 +1,8 @@
-//! Files as bytes: mapped for reading, and temporary ones.
+//! Temporary files, and bytes at places of files.
 
-use std::{fs::File, io::Read as _, ops::Deref, path::Path};
+use std::{fs::File, path::Path};
 
 use crate::Error;
-
-/// The content of a file: mapped, or read if the file cannot be mapped, such as a pipe.
-pub enum Bytes {
-    /// A map of the file.
-    Mapped(memmap2::Mmap),
-    /// A copy of the content.
-    Read(Vec<u8>),
-}
-
-impl Bytes {
-    /// Opens a file.
-    ///
-    /// # Errors
-    /// Those of the operating system.
-    #[allow(unsafe_code, reason = "a memory map is several times faster than reading, and needs unsafe")]
-    pub fn open(path: &Path) -> std::io::Result<Self> {
-        let mut file = File::open(path)?;
-        let metadata = file.metadata()?;
-        if metadata.is_file() && metadata.len() > 0 {
-            // SAFETY: the map is read-only and private to this call. If another program shortens the file meanwhile,
-            // the system ends the process with a bus error. If another program writes to the file, values are wrong,
-            // but every access is checked against the length at mapping. All programs that map files carry both risks.
-            let map = unsafe { memmap2::Mmap::map(&file) }?;
-            return Ok(Self::Mapped(map));
-        }
-        let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes)?;
-        Ok(Self::Read(bytes))
-    }
-}
-
-impl Deref for Bytes {
-    type Target = [u8];
-
-    fn deref(&self) -> &[u8] {
-        match self {
-            Self::Mapped(map) => map,
-            Self::Read(bytes) => bytes,
-        }
-    }
-}
 
 /// A temporary file without a name, which the system removes once it is closed, however the program ends.
 ///

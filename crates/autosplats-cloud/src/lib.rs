@@ -17,6 +17,7 @@
 
 mod append;
 mod axes;
+mod bytes;
 mod classes;
 mod cloud;
 mod clouds;
@@ -30,6 +31,7 @@ mod filter;
 mod geographic;
 mod guard;
 mod identity;
+mod maps;
 mod memory;
 mod merge;
 mod moved;
@@ -51,6 +53,7 @@ mod tiles;
 mod tree;
 
 pub use axes::Axes;
+pub use bytes::{Bytes, read_small};
 pub use classes::class_name;
 pub use cloud::{Field, FieldValues, PointCloud, Scan};
 pub use clouds::{Clouds, Held, Outline, add_scans};
@@ -59,20 +62,20 @@ pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use encoding::{Unmarked, read_text};
 pub use error::{Error, excerpt, one_line, printable, shown_number};
 pub use error_kind::ErrorKind;
-pub use files::{Bytes, check_disk, free_disk, read_exact_at, temporary_unnamed, write_all_at};
+pub use files::{check_disk, free_disk, read_exact_at, temporary_unnamed, write_all_at};
 pub use filter::{LeftOut, PointFilter};
 pub use geographic::{LocalMetres, looks_like_degrees};
 /// Vector library of the public interface.
 pub use glam;
 pub use guard::guard;
-pub use memory::{available_memory, check_memory, own_memory, usual_memory};
+pub use memory::{available_memory, check_memory, own_memory, total_memory, usual_memory};
 pub use merge::normal_matrix;
 pub use output::{Draft, Existing, Output, abandon_drafts, write_whole};
 pub use pool::{PointPool, PointRun, SLOT_POINTS, SLOT_SHIFT};
 pub use precision::{
     RelativeValues, ValueOrigin, degree_origin, residual, sample_step, sampled_bounds, sampled_middle, storage_origin,
 };
-pub use progress::{Part, Progress};
+pub use progress::{Part, Progress, tell_loss};
 pub use random::Random;
 pub use ranges::{FileRanges, Folder, LocalFolder, MemoryRanges, Ranges, Traffic, check_range};
 pub use reserve::{may_fail, reserving};

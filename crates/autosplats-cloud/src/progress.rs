@@ -1,6 +1,8 @@
 //! How a caller follows and cancels long work.
 
-use crate::{Error, PointCloud};
+use std::path::Path;
+
+use crate::{Error, PointCloud, one_line};
 
 /// Receives the progress and the notes of reading or writing, and may cancel the work.
 ///
@@ -64,6 +66,12 @@ pub trait Progress: Sync {
     /// line, without the file's name.
     fn note(&self, _note: &str) {}
 
+    /// Called with a note on what the input should have and has lost, because it is cut off or damaged. By default a
+    /// [note](Self::note) like others.
+    fn loss(&self, loss: &str) {
+        self.note(loss);
+    }
+
     /// Whether [`chunk`](Self::chunk) shall be called.
     fn wants_chunks(&self) -> bool {
         false
@@ -79,6 +87,20 @@ pub trait Progress: Sync {
 
 impl Progress for () {
     fn report(&self, _fraction: f32) {}
+}
+
+/// Tells what an input has lost, because it is cut off or damaged: as a [loss](Progress::loss), or as an error if only
+/// whole inputs are taken. `loss` names what is lost, without a remedy.
+///
+/// # Errors
+/// [`Error::Malformed`] at `place`, if `whole`.
+pub fn tell_loss(path: &Path, place: &str, loss: &str, whole: bool, progress: &dyn Progress) -> Result<(), Error> {
+    if whole {
+        let what = format!("{loss}; copy it again, or take what is left with --salvage");
+        return Err(Error::malformed(path, place, what));
+    }
+    progress.loss(&one_line(&format!("{loss}; copy it again")));
+    Ok(())
 }
 
 /// Progress of one step of the work: maps the step's 0 to 1 to a range of the whole. Passes no chunks on.
@@ -102,5 +124,9 @@ impl Progress for Part<'_> {
 
     fn note(&self, note: &str) {
         self.whole.note(note);
+    }
+
+    fn loss(&self, loss: &str) {
+        self.whole.loss(loss);
     }
 }

@@ -66,7 +66,7 @@ pub fn read_tree(
     options: &ReadOptions,
     progress: &dyn Progress,
 ) -> Result<PointCloud, Error> {
-    let part = Part { keep_no_returns: options.keep_no_returns, ..part.clone() };
+    let part = Part { keep_no_returns: options.keep_no_returns, whole: options.whole, ..part.clone() };
     let wanted = Wanted { colors: true, exact: options.exact, keep: options.keep.clone(), ..Wanted::default() };
     read_part(tree, &part, &wanted, progress)
 }

@@ -123,7 +123,7 @@ impl Player {
                 Ok(Next::Nothing | Next::End) => return Ok(false),
                 Err(Error::Cancelled) => return Err(Error::Cancelled),
                 Err(error) => {
-                    progress.note(&error.to_string());
+                    progress.loss(&error.to_string());
                     return Ok(false);
                 }
             }
@@ -206,7 +206,7 @@ impl Player {
             Ok(Next::End) => Err(Error::NoFrames { name: "the stream".into(), why: "it has ended".into() }),
             Err(Error::Cancelled) => Err(Error::Cancelled),
             Err(error) => {
-                progress.note(&error.to_string());
+                progress.loss(&error.to_string());
                 Ok(None)
             }
         }

@@ -78,6 +78,9 @@ pub(crate) struct PartArgs {
     /// Read octrees (COPC, EPT) only as far as neighbouring points are SIZE apart, in the input's units
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
     pub(crate) spacing: Option<f64>,
+    /// Take what is left of inputs that are cut off or damaged, instead of failing
+    #[arg(long)]
+    pub(crate) salvage: bool,
 }
 
 /// Point processing of `convert`, in the order of its steps.
@@ -126,7 +129,7 @@ pub(crate) struct NormalsArgs {
     #[command(flatten)]
     pub(crate) input: InputArgs,
     /// Number of neighbours that the plane of each point is fitted to, 3 to 1024; more is smoother
-    #[arg(short, value_name = "COUNT", default_value_t = NormalSettings::default().k, allow_negative_numbers = true, help_heading = "Normals")]
+    #[arg(short, value_name = "COUNT", value_parser = values::normal_neighbors, default_value_t = NormalSettings::default().k, allow_negative_numbers = true, help_heading = "Normals")]
     pub(crate) k: u32,
     /// Side that the normals point to
     #[arg(long, value_enum, default_value = "auto", help_heading = "Normals")]

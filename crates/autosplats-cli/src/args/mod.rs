@@ -90,7 +90,7 @@ pub(crate) struct RunArgs {
     /// Number of threads, 1 to 1024; results do not depend on it [default: one per core]
     #[arg(long, value_name = "COUNT", value_parser = values::threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<u16>,
-    /// Print only errors on standard error, no progress and no summary
+    /// Print only errors and what inputs have lost on standard error, no progress and no summary
     #[arg(long)]
     pub(crate) quiet: bool,
 }

@@ -105,6 +105,7 @@ pub(crate) struct SurfaceArgs {
     #[arg(
         long,
         value_name = "FACTOR",
+        value_parser = values::gap_factor,
         default_value_t = Reconstruction::default().gap_factor.unwrap_or_default(),
         allow_negative_numbers = true,
         conflicts_with = "bridge_gaps"

@@ -23,7 +23,7 @@ const VOXEL_BYTES: u64 = 32;
 /// Reads the inputs and writes the file.
 pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
     let ConvertArgs { paths, input, force, part, thinning, .. } = args;
-    let (inputs, output) = Inputs::with_output(paths, args.output.as_deref(), input)?;
+    let (inputs, output) = Inputs::with_output(paths, args.output.as_deref(), input, part)?;
     let output = forced(&output, *force);
     check_cloud_target(output, &inputs.files([]))?;
     check_room(&args.room)?;

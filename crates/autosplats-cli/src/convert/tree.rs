@@ -48,6 +48,7 @@ pub(super) fn run(args: &ConvertArgs, inputs: &Inputs, output: Output<'_>, conso
         bounds: args.part.bounds,
         keep: args.input.reading.keep.clone(),
         keep_no_returns: args.input.reading.keep_no_returns,
+        whole: !args.part.salvage,
     };
     let bar = Bar::on_file("building", output.path, console);
     let temp = options.temp.as_deref().unwrap_or(folder_of(output.path));

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use autosplats::guess_axes;
-use autosplats_cloud::{Clouds, Crs, Error, Held, Part, PointCloud, Progress, Unit, check_memory};
-use autosplats_formats::{Attribute, Description, ReadOptions, describe, describe_tree};
+use autosplats_cloud::{Bytes, Clouds, Crs, Error, Held, Part, PointCloud, Progress, Unit, check_memory};
+use autosplats_formats::{Attribute, Description, ReadOptions, describe, describe_bytes, describe_tree, read_bytes};
 use autosplats_sources::{PlayOptions, RecordingSummary, Source, describe_recording};
 
 use super::notes::NoteCollector;
@@ -61,8 +61,11 @@ impl Examiner {
     }
 
     fn file(&self, source: &Source, path: &Path, report: &mut Report) -> Result<(), Error> {
+        if !path.is_file() {
+            return self.pipe(path, report);
+        }
         let bytes = path.metadata().map_or(0, |metadata| metadata.len());
-        report.file_bytes = path.is_file().then_some(bytes);
+        report.file_bytes = Some(bytes);
         let bar = Bar::on_file("opening", path, &self.console);
         let header = match source.open_tree(&self.options, &bar)? {
             Some(tree) => describe_tree(&*tree),
@@ -95,6 +98,19 @@ impl Examiner {
             Some(parts) => report.scan_all(&parts, &header.attributes, Some(&self.room), &bar),
             None => report.scan(&source.read(&self.options, &())?, &header.attributes),
         }
+    }
+
+    /// Describes what comes through a pipe, which can be read only once.
+    fn pipe(&self, path: &Path, report: &mut Report) -> Result<(), Error> {
+        let bar = Bar::on_file("reading", path, &self.console);
+        let listener = NoteCollector::new(&bar);
+        let bytes = Bytes::open(path)?;
+        let header = describe_bytes(path, &bytes, &self.options)?;
+        report.describe(&header);
+        let cloud = read_bytes(path, &bytes, &self.options, &listener);
+        listener.notes().into_iter().for_each(|note| report.warn(note));
+        drop(bar);
+        report.scan(&cloud?, &header.attributes)
     }
 
     /// Describes what is behind an address: an octree by its header and hierarchy, all else by its points.
@@ -251,15 +267,16 @@ impl Report {
             self.warn("not enough memory to measure spacing and count duplicates; thin the cloud".into());
             return Ok(());
         }
-        self.duplicates = Some(match (clouds.whole(), room) {
+        let duplicates = match (clouds.whole(), room) {
             (Some(cloud), _) => spacing::duplicates(cloud),
             (None, room) => spacing::duplicates_in_parts(clouds, points, room, &part(0.4, 0.1))?,
-        });
+        };
+        self.duplicates = Some(duplicates);
         if crs.unit == Some(Unit::Degree) {
             self.warn("x and y are in degrees, z is not: no spacing or density; project the points to metres".into());
         } else {
             (self.spacing, self.density) = match (clouds.whole(), room) {
-                (Some(cloud), _) => spacing::measure(cloud),
+                (Some(cloud), _) => spacing::measure(cloud, duplicates),
                 (None, room) => spacing::measure_in_parts(clouds, room, &part(0.5, 0.5))?,
             };
         }

@@ -42,8 +42,55 @@ pub(super) struct Density {
     pub(super) samples: usize,
 }
 
-/// Measures at up to [`MAX_SAMPLES`] points spread over the cloud. The choice of samples is deterministic.
-pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) {
+/// Number of points at places of others from which places are searched, and not points: a search that ends in a pile of
+/// equal points looks at all of them.
+const PILED: u64 = 1 << 10;
+
+/// Points that are searched by their places.
+struct Places<'a> {
+    points: &'a [[f32; 3]],
+    tree: ImmutableKdTree<f32, 3>,
+    /// The points, place by place, and where those of each place begin; `None` if each point is a place.
+    piles: Option<[Vec<u32>; 2]>,
+}
+
+impl<'a> Places<'a> {
+    /// `None` if no tree can be made. If not `piled`, each point is a place.
+    fn of(points: &'a [[f32; 3]], piled: bool) -> Option<Self> {
+        let tree_of = |places: &[[f32; 3]]| ImmutableKdTree::<f32, 3>::new_from_slice(places).ok();
+        let len = u32::try_from(points.len()).ok()?;
+        if !piled {
+            return Some(Self { points, tree: tree_of(points)?, piles: None });
+        }
+        // Adding 0 turns -0 into 0.
+        let bits = |index: u32| points[index as usize].map(|along| (along + 0.0).to_bits());
+        let mut order: Vec<u32> = (0..len).collect();
+        order.par_sort_unstable_by_key(|&index| (bits(index), index));
+        let begins = |&at: &u32| at == 0 || bits(order[at as usize - 1]) != bits(order[at as usize]);
+        let mut starts: Vec<u32> = (0..len).into_par_iter().filter(begins).collect();
+        let places: Vec<[f32; 3]> = starts.par_iter().map(|&at| points[order[at as usize] as usize]).collect();
+        starts.push(len);
+        Some(Self { points, tree: tree_of(&places)?, piles: Some([order, starts]) })
+    }
+
+    /// The `count` points nearest to point `own`, itself not counted, from near to far.
+    fn nearest(&self, own: usize, count: usize) -> Vec<usize> {
+        // Each place has a point at least, and one of them is the point itself.
+        let asked = NonZero::<usize>::MIN.saturating_add(count);
+        let found = self.tree.query(&self.points[own]).nearest_n::<SquaredEuclidean<f32>>(asked).execute();
+        let at_place = |place: usize| match &self.piles {
+            None => place..place + 1,
+            Some([_, starts]) => starts[place] as usize..starts[place + 1] as usize,
+        };
+        let point = |at: usize| self.piles.as_ref().map_or(at, |[order, _]| order[at] as usize);
+        let all = found.iter().flat_map(|found| at_place(found.item as usize)).map(point);
+        all.filter(|&other| other != own).take(count).collect()
+    }
+}
+
+/// Measures at up to [`MAX_SAMPLES`] points spread over the cloud, in which so many points are at places of others. The
+/// choice of samples is deterministic.
+pub(super) fn measure(cloud: &PointCloud, duplicates: u64) -> (Option<Spacing>, Option<Density>) {
     let Ok(len) = u32::try_from(cloud.len()) else { return (None, None) };
     let factor = cloud.computing_scale();
     let scaled = |index: u32| cloud.positions()[index as usize].map(|along| (f64::from(along) * factor) as f32);
@@ -56,19 +103,16 @@ pub(super) fn measure(cloud: &PointCloud) -> (Option<Spacing>, Option<Density>) 
     let samples = points.len().min(MAX_SAMPLES);
     let sample = samples_of(points.len());
 
-    let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(&points) else { return (None, None) };
+    let Some(places) = Places::of(&points, duplicates >= PILED) else { return (None, None) };
     let count = DENSITY_NEIGHBORS.min(points.len() - 1);
-    let asked = NonZero::<usize>::MIN.saturating_add(count);
     let distances: Vec<(f64, f64)> = (0..samples)
         .into_par_iter()
         .map(|i| {
             let own = sample(i);
-            let found = tree.query(&points[own]).nearest_n::<SquaredEuclidean<f32>>(asked).execute();
             // The search uses f32 coordinates; the found distances are measured in f64.
             let place = |point: usize| cloud.world_position(indices[point] as usize);
-            // The point itself is found too, unless too many coincide with it.
-            let others = found.iter().map(|found| found.item as usize).filter(|&other| other != own).take(count);
-            let mut exact: Vec<f64> = others.map(|other| place(other).distance(place(own))).collect();
+            let others = places.nearest(own, count);
+            let mut exact: Vec<f64> = others.iter().map(|&other| place(other).distance(place(own))).collect();
             exact.sort_unstable_by(f64::total_cmp);
             (exact[0], exact[count - 1])
         })
@@ -181,17 +225,14 @@ fn neighbors(tile: &Tile, area: [[f32; 3]; 2], samples: &[u64], count: usize) ->
     if positions.len() <= count {
         return infinite();
     }
-    let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(&positions) else { return infinite() };
-    let asked = NonZero::<usize>::MIN.saturating_add(count);
+    let Some(places) = Places::of(&positions, true) else { return infinite() };
     let inside = |place: usize, [low, high]: [[f32; 3]; 2]| {
         let position = positions[place];
         let along = |axis: usize| (position[axis] - low[axis]).min(high[axis] - position[axis]);
         along(0).min(along(1)).min(along(2))
     };
     let each = own.par_iter().map(|&place| {
-        let found = tree.query(&positions[place]).nearest_n::<SquaredEuclidean<f32>>(asked).execute();
-        let others: Vec<usize> =
-            found.iter().map(|found| found.item as usize).filter(|&i| i != place).take(count).collect();
+        let others = places.nearest(place, count);
         let apart = |&other: &usize| {
             let along = |axis: usize| positions[other][axis] - positions[place][axis];
             (along(0).powi(2) + along(1).powi(2) + along(2).powi(2)).sqrt()
@@ -290,7 +331,7 @@ mod tests {
     #[test]
     fn a_grid_has_its_spacing_and_density() {
         let grid = (0..40_000).map(|i| [(i % 200) as f32 * 0.5, (i / 200) as f32 * 0.5, 0.0]).collect();
-        let (spacing, density) = measure(&PointCloud::new(DVec3::new(5e5, 5e6, 0.0), grid));
+        let (spacing, density) = measure(&PointCloud::new(DVec3::new(5e5, 5e6, 0.0), grid), 0);
         let spacing = spacing.expect("there are points");
         assert_eq!([spacing.median, spacing.p95, spacing.mean], [0.5; 3], "exactly");
         assert_eq!(spacing.samples, 10_000, "a part of them");
@@ -300,11 +341,38 @@ mod tests {
 
     #[test]
     fn few_points() {
-        let of = |points: &[[f32; 3]]| measure(&PointCloud::new(DVec3::ZERO, points.to_vec()));
+        let of = |points: &[[f32; 3]]| measure(&PointCloud::new(DVec3::ZERO, points.to_vec()), 0);
         assert_eq!(of(&[]), (None, None), "none");
         assert_eq!(of(&[[1.0; 3], [f32::NAN; 3]]), (None, None), "one that is somewhere");
         let (spacing, density) = of(&[[0.0; 3], [3.0, 4.0, 0.0]]);
         assert_eq!((spacing.map(|spacing| spacing.median), density), (Some(5.0), None), "two");
+    }
+
+    #[test]
+    fn piles_of_equal_points_are_measured_as_other_points_are() {
+        // Piles of up to 40 points on a line, so that neighbours lie in several piles.
+        let points: Vec<[f32; 3]> =
+            (0..300_u16).flat_map(|i| vec![[f32::from(i * i % 97), 0.0, -0.0]; 1 + usize::from(i % 40) / 3]).collect();
+        let cloud = PointCloud::new(DVec3::ZERO, points.clone());
+        assert_eq!(measure(&cloud, PILED), measure(&cloud, 0), "either way");
+        let places = Places::of(&points, true).expect("a tree");
+        for own in (0..points.len()).step_by(7) {
+            let apart = |other: &usize| (points[*other][0] - points[own][0]).abs();
+            let mut nearest: Vec<f32> = (0..points.len()).filter(|&other| other != own).map(|i| apart(&i)).collect();
+            nearest.sort_unstable_by(f32::total_cmp);
+            let found: Vec<f32> = places.nearest(own, 30).iter().map(apart).collect();
+            assert_eq!(found, nearest[..30], "as by trying all, of point {own}");
+        }
+    }
+
+    #[test]
+    fn equal_points_cost_no_more_than_others() {
+        let cloud = PointCloud::new(DVec3::ZERO, vec![[1.0, 2.0, 3.0]; 1 << 20]);
+        let begun = std::time::Instant::now();
+        let (spacing, density) = measure(&cloud, duplicates(&cloud));
+        assert_eq!((spacing.map(|spacing| spacing.p95), density), (Some(0.0), None), "all at one place");
+        // A search through all points at each sample takes minutes.
+        assert!(begun.elapsed().as_secs() < 30, "{:?}", begun.elapsed());
     }
 
     #[test]

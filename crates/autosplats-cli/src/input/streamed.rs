@@ -1,6 +1,6 @@
 //! Inputs whose points are read in parts, for what needs no more memory than a part.
 
-use std::fs::{File, Metadata};
+use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -26,10 +26,12 @@ impl Inputs {
     pub(crate) fn points_at_most(&self) -> Option<u64> {
         match self.list.as_slice() {
             [input] if is_plain(input) => match &input.source {
+                // What comes through a pipe can be read only once.
+                Source::File(path) if !path.is_file() => None,
                 Source::File(path) => match describe(path, &input.options) {
                     Ok(description) if description.points.is_some() => description.points,
                     // Text does not state it. No row is shorter than three digits, each with a byte behind it.
-                    _ => path.metadata().ok().filter(Metadata::is_file).map(|metadata| metadata.len() / 6),
+                    _ => path.metadata().ok().map(|metadata| metadata.len() / 6),
                 },
                 Source::Scene(_, count) if !input.moves() => Some(*count as u64),
                 _ => None,
@@ -75,7 +77,7 @@ fn streamed(input: &Input) -> TreeInput<'_> {
 /// Whether a file begins as LAS files do.
 fn is_las(path: &Path) -> bool {
     let mut start = [0; 4];
-    File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *b"LASF"
+    path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *b"LASF"
 }
 
 /// Share of reading a file for the first time that settling takes what all its points tell.

@@ -20,7 +20,7 @@ impl Inputs {
     /// Reads a part of all inputs into one cloud, which may be empty. Returns the number of points of which it is a
     /// part, too.
     pub(crate) fn read_part(&self, part: &PartArgs, console: &Console) -> Result<(PointCloud, u64), Failure> {
-        let &PartArgs { bounds, spacing } = part;
+        let &PartArgs { bounds, spacing, salvage: _ } = part;
         let all = AtomicU64::new(0);
         let mut cloud = self.read_each(console, bounds.is_some(), |input, progress| {
             let is_partial = bounds.is_some() || spacing.is_some();

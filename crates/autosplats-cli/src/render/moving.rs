@@ -46,6 +46,9 @@ pub(super) fn run(
         let plural = if there == 1 { "" } else { "s" };
         format!("{} has {there} frame{plural}, 0 to {}", job.inputs.names(), there.saturating_sub(1))
     };
+    if there == 0 {
+        return Err(Failure::new(Exit::Input, format!("{}: there are no points in it", job.inputs.names())));
+    }
     if frames.is_empty() {
         return Err(Failure::usage(format!("--frames: {}", has())));
     }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use super::{Counter, Traffic};
-use crate::{Error, Progress, check_memory};
+use crate::{Error, Progress, check_memory, read_small};
 
 /// Files below one address that are small enough to be read whole, on many threads at once.
 pub trait Folder: Send + Sync + fmt::Debug {
@@ -44,7 +44,7 @@ impl LocalFolder {
             return Err(Error::unsupported(&path, too_large(size, most)));
         }
         check_memory("a file of a tree", size)?;
-        let bytes = std::fs::read(&path).map_err(fail)?;
+        let bytes = read_small(&path, most).map_err(fail)?;
         self.read.add(bytes.len() as u64);
         Ok(bytes)
     }

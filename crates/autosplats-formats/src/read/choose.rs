@@ -154,6 +154,10 @@ impl Progress for ChosenPreviews<'_> {
         self.progress.note(note);
     }
 
+    fn loss(&self, loss: &str) {
+        self.progress.loss(loss);
+    }
+
     fn wants_chunks(&self) -> bool {
         true
     }

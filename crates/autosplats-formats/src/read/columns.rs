@@ -18,23 +18,46 @@ pub(super) struct Given {
 /// The names that the caller gives to the columns, if any. `...` at the end leaves out whatever follows.
 pub(super) fn given(job: &Job<'_>) -> Result<Option<Given>, Error> {
     let Some(names) = &job.options.columns else { return Ok(None) };
-    let (names, open) = match names.split_last() {
+    check_columns(names).map_err(|what| job.unsupported(what))?;
+    let (names, open) = closed(names);
+    let name = |name: &String| (name != "-" && name != "_").then(|| name.clone());
+    Ok(Some(Given { names: names.iter().map(name).collect(), open }))
+}
+
+/// The names without `...` at the end, and whether it was there.
+fn closed(names: &[String]) -> (&[String], bool) {
+    match names.split_last() {
         Some((last, names)) if last == "..." || last == "…" => (names, true),
-        _ => (&names[..], false),
-    };
+        _ => (names, false),
+    }
+}
+
+/// Checks names for [columns](super::ReadOptions::columns), which no file makes right.
+///
+/// # Errors
+/// What is wrong, in one line: too many names, or not each of x, y and z once.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_formats::check_columns;
+///
+/// assert!(check_columns(&["x", "y", "z", "-"].map(String::from)).is_ok());
+/// assert!(check_columns(&["x", "y", "Intensity"].map(String::from)).is_err());
+/// ```
+pub fn check_columns(names: &[String]) -> Result<(), String> {
+    let (names, _) = closed(names);
     if names.len() > MAX_COLUMNS {
-        return Err(job.unsupported(format!("--columns names {} columns; at most {MAX_COLUMNS}", names.len())));
+        return Err(format!("--columns names {} columns; at most {MAX_COLUMNS}", names.len()));
     }
     for axis in ["x", "y", "z"] {
         let count = names.iter().filter(|name| name.eq_ignore_ascii_case(axis)).count();
         if count != 1 {
             let names = excerpt(names.join(" ").as_bytes());
-            let what = format!("--columns {names}: {axis} is named {count} times; name each of x, y and z once");
-            return Err(job.unsupported(what));
+            return Err(format!("--columns {names}: {axis} is named {count} times; name each of x, y and z once"));
         }
     }
-    let name = |name: &String| (name != "-" && name != "_").then(|| name.clone());
-    Ok(Some(Given { names: names.iter().map(name).collect(), open }))
+    Ok(())
 }
 
 /// Largest number of columns that a note lists.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use autosplats_cloud::{Contents, Error, PointCloud, Progress, check_memory, one_line};
+use autosplats_cloud::{Contents, Error, PointCloud, Progress, check_memory, one_line, tell_loss};
 
 use super::{describe::Description, options::ReadOptions};
 
@@ -49,7 +49,7 @@ impl Job<'_> {
     /// Tells that the file ends after `held` of `claimed` points, if it does.
     ///
     /// # Errors
-    /// [`Error::Malformed`] if it holds none of them.
+    /// [`Error::Malformed`] if it holds none of them, or if the options take only whole files.
     pub(super) fn tell_cut_off(&self, held: usize, claimed: usize, what: &str) -> Result<(), Error> {
         if held == 0 && claimed > 0 {
             let what = format!("the file ends before the first of {claimed} {what}; it is cut off, copy it again");
@@ -57,9 +57,18 @@ impl Job<'_> {
         }
         if held < claimed {
             let lost = claimed - held;
-            self.note(format!("the file is cut off: {lost} of {claimed} {what} are lost; copy it again"));
+            let end = format!("byte {}", self.bytes.len());
+            self.loss(&end, format!("the file is cut off: {lost} of {claimed} {what} are lost"))?;
         }
         Ok(())
+    }
+
+    /// Tells what is lost of a file that is cut off or damaged, without a remedy.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] if the options take only whole files.
+    pub(super) fn loss(&self, place: &str, loss: impl AsRef<str>) -> Result<(), Error> {
+        tell_loss(self.path, place, loss.as_ref(), self.options.whole, self.progress)
     }
 
     /// Fails if the caller cancels; reports no progress.

@@ -48,6 +48,7 @@ mod xyz;
 
 use self::job::{Format, Job, MAX_HEADER_LINE};
 pub use self::{
+    columns::check_columns,
     describe::{Attribute, Description},
     options::ReadOptions,
     parts::{Parts, open_parts, open_parts_of},

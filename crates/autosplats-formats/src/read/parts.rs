@@ -6,7 +6,7 @@
 //! settled first, from the same samples and counts as if the file was read whole. Then the points can be passed on
 //! again and again, a few at a time, and are the same.
 
-use std::{borrow::Cow, path::Path};
+use std::{borrow::Cow, fs::Metadata, path::Path};
 
 use autosplats_cloud::{Bytes, Error, LeftOut, PointCloud, PointFilter, Progress, Unmarked};
 
@@ -110,12 +110,24 @@ pub fn open_parts_of(
     if !metadata.is_file() {
         return Ok(None);
     }
-    let map = Bytes::open(path).map_err(io)?;
+    let map = Bytes::open(path)?;
+    map.checked(open_mapped(path, &metadata, &map, options, part, progress))
+}
+
+/// Opens a file whose bytes are mapped.
+fn open_mapped(
+    path: &Path,
+    metadata: &Metadata,
+    map: &[u8],
+    options: &ReadOptions,
+    part: usize,
+    progress: &dyn Progress,
+) -> Result<Option<Parts>, Error> {
     if map.starts_with(GZIP) {
         return Ok(None);
     }
-    let Unmarked { bytes: Cow::Borrowed(bytes), .. } = Unmarked::of(&map)? else { return Ok(None) };
-    let file = Opened::new(path, &metadata, map.len() - bytes.len(), part.max(1));
+    let Unmarked { bytes: Cow::Borrowed(bytes), .. } = Unmarked::of(map)? else { return Ok(None) };
+    let file = Opened::new(path, metadata, map.len() - bytes.len(), part.max(1));
     let job = Job { path, progress, bytes, options, triangles: false };
     job.tick(0.0)?;
     let format = registry::format(&job)?;
@@ -263,6 +275,12 @@ impl Progress for Stage<'_> {
     fn note(&self, note: &str) {
         if self.notes {
             self.whole.note(note);
+        }
+    }
+
+    fn loss(&self, loss: &str) {
+        if self.notes {
+            self.whole.loss(loss);
         }
     }
 }

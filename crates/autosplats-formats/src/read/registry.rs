@@ -87,8 +87,8 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<PointCloud, Error> {
 /// # Errors
 /// Those of [`read`].
 pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
-    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    read_bytes(path, &bytes, options, progress)
+    let bytes = Bytes::open(path)?;
+    bytes.checked(read_bytes(path, &bytes, options, progress))
 }
 
 /// Like [`read_with`], from the bytes of a file. `name` helps to recognise the format and appears in messages.
@@ -141,11 +141,11 @@ pub fn read_marked(
     options: &ReadOptions,
     progress: &dyn Progress,
 ) -> Result<(PointCloud, LeftOut), Error> {
-    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    with_job(path, &bytes, options, progress, false, |job, _| {
+    let bytes = Bytes::open(path)?;
+    bytes.checked(with_job(path, &bytes, options, progress, false, |job, _| {
         let (contents, left) = contents(job)?;
         Ok((contents.cloud, left))
-    })
+    }))
 }
 
 /// Reads points and the triangles between them.
@@ -153,8 +153,8 @@ pub fn read_marked(
 /// # Errors
 /// Those of [`read`].
 pub fn read_mesh(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<Contents, Error> {
-    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    read_mesh_bytes(path, &bytes, options, progress)
+    let bytes = Bytes::open(path)?;
+    bytes.checked(read_mesh_bytes(path, &bytes, options, progress))
 }
 
 /// Like [`read_mesh`], from the bytes of a file. `name` helps to recognise the format and appears in messages.
@@ -232,8 +232,8 @@ pub fn files_beside(path: &Path) -> Vec<PathBuf> {
 /// # Errors
 /// Those of [`read`], as far as the header shows them.
 pub fn describe(path: &Path, options: &ReadOptions) -> Result<Description, Error> {
-    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    describe_bytes(path, &bytes, options)
+    let bytes = Bytes::open(path)?;
+    bytes.checked(describe_bytes(path, &bytes, options))
 }
 
 /// Like [`describe`], from the bytes of a file.

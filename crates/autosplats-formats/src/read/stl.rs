@@ -168,7 +168,7 @@ fn read_text(job: &Job<'_>) -> Result<Contents, Error> {
         return Err(job.malformed(job.line(job.bytes.len()), what));
     }
     if closed != Some(true) {
-        job.note("the file does not end with 'endsolid'; it may be cut off");
+        job.loss(&job.line(job.bytes.len()), "the file does not end with 'endsolid'; it may be cut off")?;
     }
     let Welded { firsts, points } = mesh::weld(job, corners.len(), WELDING, |i| corners[i].map(mesh::bits))?;
     let part = ProgressRange { start: 0.8, len: 0.1 };

@@ -44,6 +44,10 @@ pub fn open_tree(path: &Path, progress: &dyn Progress) -> Result<Option<Arc<dyn 
         let folder = || Arc::new(LocalFolder::new(path));
         return path.join(EPT).is_file().then(|| open_ept_in(folder(), progress)).transpose();
     }
+    // What comes through a pipe can be read only once.
+    if !path.metadata().map_err(|source| Error::Io { path: path.into(), source })?.is_file() {
+        return Ok(None);
+    }
     if let Some(name) = ept_name(path)? {
         let folder = Arc::new(LocalFolder::new(path.parent().unwrap_or(Path::new(""))));
         return Ok(Some(Arc::new(ept::open(folder, &name, progress)?)));

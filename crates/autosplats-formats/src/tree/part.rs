@@ -1,6 +1,6 @@
 //! Reading a part of a tree as one cloud.
 
-use autosplats_cloud::{Error, Key, PointCloud, Progress, Tree, Unit, Wanted, check_memory};
+use autosplats_cloud::{Error, Key, PointCloud, Progress, Tree, Unit, Wanted, check_memory, tell_loss};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -25,6 +25,8 @@ pub struct Part {
     pub spacing: Option<f64>,
     /// Keep points at (0, 0, 0), which scanners write for missing returns.
     pub keep_no_returns: bool,
+    /// Take only whole trees: damaged nodes are an error.
+    pub whole: bool,
 }
 
 /// Reads a part of a tree into one cloud, whose points are those of reading the file whole. Only nodes that may have
@@ -41,7 +43,7 @@ pub fn read_part(tree: &dyn Tree, part: &Part, wanted: &Wanted, progress: &dyn P
     info.notes.iter().for_each(|note| progress.note(note));
     let (mut nodes, _) = walk(tree, |key| part.has(tree, key), Some(progress))?;
     let total: u64 = nodes.iter().map(|node| u64::from(node.points)).sum();
-    if *part == Part::default() && total != info.points {
+    if (part.bounds, part.spacing) == (None, None) && total != info.points {
         progress.note(&format!("{} points are stated, but the hierarchy has {total}", info.points));
     }
     nodes.retain(|node| node.points > 0);
@@ -68,7 +70,8 @@ pub fn read_part(tree: &dyn Tree, part: &Part, wanted: &Wanted, progress: &dyn P
             return Err(fault);
         }
         let lost = reading.lost;
-        progress.note(&format!("damaged nodes: {lost} of {total} points are lost; copy the file again"));
+        let loss = format!("damaged nodes: {lost} of {total} points are lost");
+        tell_loss(tree.name(), "nodes", &loss, part.whole, progress)?;
     }
     let (read, left) = (reading.read, reading.read - cloud.len() as u64);
     if let Some(filter) = wanted.keep.as_ref().filter(|_| left > 0) {

@@ -11,7 +11,7 @@ use autosplats_cloud::{
     Axes, Crs, FieldValues, PointCloud, Progress, Random, Scan, Unit,
     glam::{DMat4, DQuat, DVec3, EulerRot},
 };
-use autosplats_formats::{ReadOptions, describe, read_bytes, read_with, write};
+use autosplats_formats::{ReadOptions, describe, describe_bytes, read_bytes, read_with, write};
 
 /// Stores the notes.
 #[derive(Default)]
@@ -409,6 +409,14 @@ fn claims_that_lie_are_refused() {
     let cloud = read_bytes(Path::new("a.e57"), &more, &ReadOptions::default(), &notes).unwrap();
     let notes = notes.0.into_inner().unwrap().join("\n");
     assert!(cloud.len() == 300 && notes.contains("end after 300 of 999 points"), "{} {notes}", cloud.len());
+    let whole = ReadOptions { whole: true, ..ReadOptions::default() };
+    let refused = read_bytes(Path::new("a.e57"), &more, &whole, &()).map(|cloud| cloud.len()).unwrap_err().to_string();
+    assert!(refused.contains("end after 300 of 999 points") && refused.ends_with("--salvage"), "{refused}");
+    // Constants would take no bytes, but no file has them only.
+    let boast = changed(&bytes, "recordCount=\"300\"", "recordCount=\"18446744073709551615\"");
+    let about = describe_bytes(Path::new("a.e57"), &boast, &ReadOptions::default()).unwrap();
+    assert_eq!(about.points, None, "no more than the file can hold");
+    assert!(about.notes.iter().any(|note| note.contains("18446744073709551615 points, which")), "{:?}", about.notes);
 }
 
 #[test]

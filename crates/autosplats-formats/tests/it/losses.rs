@@ -10,7 +10,7 @@ use autosplats_cloud::{
     Axes, Crs, FieldValues, PointCloud, Progress, Scan,
     glam::{DMat4, DVec3},
 };
-use autosplats_formats::{ReadOptions, read, read_with, write};
+use autosplats_formats::{ReadOptions, open_parts_of, read, read_with, write};
 
 #[derive(Default)]
 struct Notes(Mutex<Vec<String>>);
@@ -19,6 +19,51 @@ impl Progress for Notes {
     fn report(&self, _fraction: f32) {}
     fn note(&self, note: &str) {
         self.0.lock().unwrap().push(note.into());
+    }
+}
+
+/// Keeps losses, but not notes.
+#[derive(Default)]
+struct Losses(Mutex<Vec<String>>);
+
+impl Progress for Losses {
+    fn report(&self, _fraction: f32) {}
+    fn loss(&self, loss: &str) {
+        self.0.lock().unwrap().push(loss.into());
+    }
+}
+
+#[test]
+fn what_is_cut_off_is_a_loss_or_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = PointCloud::new(DVec3::ZERO, positions(5000));
+    for name in ["a.ply", "a.pcd", "a.las", "ascii.ply"] {
+        let path = folder.path().join(name);
+        write(&cloud, &path, &()).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        if name == "ascii.ply" {
+            let rows = positions(5000).iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect::<String>();
+            let names = "property float x\nproperty float y\nproperty float z\nend_header\n";
+            bytes = format!("ply\nformat ascii 1.0\nelement vertex 5000\n{names}{rows}").into_bytes();
+        }
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        let read = |whole: bool, losses: &Losses| {
+            let options = ReadOptions { whole, ..ReadOptions::default() };
+            let all = read_with(&path, &options, losses).map(|cloud| cloud.len());
+            let parts = open_parts_of(&path, &options, 1 << 10, losses).map(|parts| parts.unwrap().points());
+            [all, parts]
+        };
+        let losses = Losses::default();
+        let [all, parts] = read(false, &losses).map(Result::unwrap);
+        assert!(all == parts && (2000..3000).contains(&all), "{name}: {all} and {parts} points");
+        let told = losses.0.into_inner().unwrap();
+        let loss = format!("the file is cut off: {} of 5000 points are lost; copy it again", 5000 - all);
+        assert_eq!(told, [&*loss, &*loss], "{name}");
+        for error in read(true, &Losses::default()).map(Result::unwrap_err) {
+            let error = error.to_string();
+            let remedy = "points are lost; copy it again, or take what is left with --salvage";
+            assert!(error.contains(name) && error.ends_with(remedy), "{name}: {error}");
+        }
     }
 }
 

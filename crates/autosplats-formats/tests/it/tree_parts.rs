@@ -125,7 +125,7 @@ fn damaged_nodes_are_left_out_and_told() {
     let cloud = read_part(&*open(bytes.clone()), &Part::default(), &everything(false), &notes).unwrap();
     assert_eq!(cloud.len(), 20_000 - lost.points as usize);
     let told = notes.notes.into_inner().unwrap();
-    assert_eq!(told, [format!("damaged nodes: {} of 20000 points are lost; copy the file again", lost.points)]);
+    assert_eq!(told, [format!("damaged nodes: {} of 20000 points are lost; copy it again", lost.points)]);
     for entry in entries.iter().filter(|entry| entry.points > 0) {
         let at = entry.offset as usize + 36;
         bytes[at..at + 4].copy_from_slice(&1_u32.to_le_bytes());

@@ -29,7 +29,7 @@ mod tests;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use autosplats_cloud::{Axes, Error, PointCloud, Progress, reserving};
+use autosplats_cloud::{Axes, Error, PointCloud, Progress, check_memory, reserving};
 use glam::DVec3;
 
 use self::model::{Model, Points};
@@ -72,7 +72,6 @@ pub struct Hit {
 
 /// Makes the points of a [`Scene`], in parts.
 pub struct Sampler<'a> {
-    scene: &'a Scene,
     count: usize,
     way: Way<'a>,
 }
@@ -91,15 +90,17 @@ impl Sampler<'_> {
     /// If the range is another.
     ///
     /// # Errors
-    /// [`Error::BadScene`] if memory does not suffice, and [`Error::Cancelled`] if `progress` says so.
+    /// [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says so.
     pub fn part(&self, range: Range<usize>, progress: &dyn Progress) -> Result<PointCloud, Error> {
         let Range { start, end } = range;
         let whole = start.is_multiple_of(Scene::BLOCK) && (end.is_multiple_of(Scene::BLOCK) || end == self.count);
         assert!(whole && start <= end && end <= self.count, "points {range:?} of {}", self.count);
         let count = range.len();
         // A failed reservation becomes an error. The zeroed vectors below would abort the process instead.
+        let (what, bytes) = ("the points of a generated scene", count.saturating_mul(15));
+        check_memory(what, bytes as u64)?;
         if reserving(|| Vec::<[u8; 15]>::new().try_reserve_exact(count)).is_err() {
-            return Err(self.scene.refuse(self.count, "not enough memory for so many points"));
+            return Err(Error::OutOfMemory { what: what.into(), bytes });
         }
         let (mut positions, mut colors) = (vec![[0.0; 3]; count], vec![[0; 3]; count]);
         let finished = match &self.way {
@@ -215,7 +216,7 @@ impl Scene {
             Points::Sampled(shares) => Way::Sampled(sample::Zones::new(tree, shares)),
             Points::Scanned(stations) => Way::Scanned(tree, stations),
         };
-        Ok(Sampler { scene: self, count, way })
+        Ok(Sampler { count, way })
     }
 
     fn refuse(&self, count: usize, why: &str) -> Error {

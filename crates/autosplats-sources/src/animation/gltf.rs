@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use autosplats_cloud::{Contents, Error, PointCloud, Progress};
+use autosplats_cloud::{Bytes, Contents, Error, PointCloud, Progress, check_memory};
 use autosplats_formats::{gltf_animation, read_gltf_at};
 use autosplats_scenes::Surface;
 
@@ -25,7 +25,10 @@ pub(super) struct Gltf {
 
 impl Gltf {
     pub(super) fn open(path: &Path, fps: f64, progress: &dyn Progress) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
+        let file = Bytes::open(path)?;
+        check_memory("the content of the file", file.len() as u64)?;
+        let bytes = file.to_vec();
+        let bytes = file.checked(Ok(bytes))?;
         let no_frames = |why: &str| Error::NoFrames { name: path.display().to_string(), why: why.into() };
         let Some((seconds, animations)) = gltf_animation(path, &bytes)? else {
             return Err(no_frames("it has no animation"));

@@ -178,4 +178,10 @@ impl Progress for FrameProgress<'_> {
             self.progress.note(note);
         }
     }
+
+    fn loss(&self, loss: &str) {
+        if self.notes {
+            self.progress.loss(loss);
+        }
+    }
 }

@@ -30,8 +30,8 @@ struct State {
     /// The last refusal that no caller has seen yet.
     refusal: Option<Error>,
     statistics: Statistics,
-    /// Different notes of the readers.
-    notes: Vec<String>,
+    /// Different notes of the readers, and whether they are of losses.
+    notes: Vec<(String, bool)>,
     /// Number of notes that a caller has seen.
     told: usize,
     /// Bytes of files received, complete or not.
@@ -81,10 +81,10 @@ impl Mailbox {
     }
 
     /// Passes on what a reader noted, once.
-    pub(super) fn note(&self, note: &str) {
+    pub(super) fn note(&self, note: &str, is_loss: bool) {
         let notes = &mut self.state().notes;
-        if notes.len() < MAX_NOTES && notes.iter().all(|known| known != note) {
-            notes.push(note.into());
+        if notes.len() < MAX_NOTES && notes.iter().all(|(known, _)| known != note) {
+            notes.push((note.into(), is_loss));
         }
     }
 
@@ -109,7 +109,9 @@ impl Mailbox {
         let start = Instant::now();
         let mut state = self.state();
         loop {
-            state.notes[state.told..].iter().for_each(|note| progress.note(note));
+            for (note, is_loss) in &state.notes[state.told..] {
+                if *is_loss { progress.loss(note) } else { progress.note(note) }
+            }
             state.told = state.notes.len();
             if let Some(refusal) = state.refusal.take() {
                 self.changed.notify_all();

@@ -57,6 +57,10 @@ impl Progress for UntilAbandoned<'_> {
     }
 
     fn note(&self, note: &str) {
-        self.0.note(note);
+        self.0.note(note, false);
+    }
+
+    fn loss(&self, loss: &str) {
+        self.0.note(loss, true);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use autosplats_cloud::{Bytes, Error, Part, Progress, one_line};
+use autosplats_cloud::{Bytes, Error, Part, Progress, one_line, read_text};
 use autosplats_formats::check_not_lfs_pointer;
 
 use super::{
@@ -31,12 +31,11 @@ enum Unpacked {
 
 impl File {
     pub(super) fn open(path: &Path, progress: &dyn Progress) -> Result<Self, Error> {
-        let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
-        Self::of(path, bytes, progress)
+        Self::of(path, Bytes::open(path)?, progress)
     }
 
     pub(super) fn of_bytes(path: &Path, bytes: Vec<u8>, progress: &dyn Progress) -> Result<Self, Error> {
-        Self::of(path, Bytes::Read(bytes), progress)
+        Self::of(path, bytes.into(), progress)
     }
 
     fn of(path: &Path, bytes: Bytes, progress: &dyn Progress) -> Result<Self, Error> {
@@ -57,7 +56,10 @@ impl File {
                 Error::malformed(path, "byte 0", "the file is neither an MCAP file nor a ROS 1 bag")
             });
         };
-        let index = Index::of(&mut container, &bytes, first, progress)?;
+        let index = Index::of(&mut container, &bytes, first, progress);
+        // A recording may grow while it is played, but not shrink.
+        bytes.check()?;
+        let index = index?;
         if index.topics.is_empty()
             && let Some(fault) = index.faults.first()
         {
@@ -134,7 +136,7 @@ pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<OpenedF
         return Ok(OpenedFiles { files: vec![File::open(path, progress)?], missing: Vec::new() });
     }
     let io = |source| Error::Io { path: path.into(), source };
-    let mut parts = parts(&std::fs::read_to_string(path.join(METADATA)).unwrap_or_default());
+    let mut parts = parts(&read_text(&path.join(METADATA)).unwrap_or_default());
     if parts.is_empty() {
         for entry in std::fs::read_dir(path).map_err(io)? {
             parts.extend(entry.map_err(io)?.file_name().into_string());

@@ -19,7 +19,7 @@ mod transforms;
 
 use std::{collections::HashMap, path::Path, time::Duration};
 
-use autosplats_cloud::{Error, Part, Progress, one_line};
+use autosplats_cloud::{Error, Part, Progress, one_line, tell_loss};
 use autosplats_formats::ReadOptions;
 
 pub use self::{
@@ -166,15 +166,22 @@ impl Recording {
         let timeline = Timeline::new(frames.iter().map(|(place, _)| place.time).collect());
 
         let mut statistics = Statistics::default();
+        let whole = options.read.whole;
         for noted in missing {
-            progress.note(&noted);
+            if whole {
+                tell_loss(path, "parts", &noted, whole, progress)?;
+            }
+            progress.loss(&noted);
             statistics.refused += 1;
             statistics.last_refusal = Some(noted);
         }
         for file in &files {
             for fault in &file.index.faults {
                 let noted = format!("{}: {}", fault.place(), fault.what);
-                progress.note(&one_line(&noted));
+                if whole {
+                    tell_loss(&file.path, &fault.place(), &fault.what, whole, progress)?;
+                }
+                progress.loss(&one_line(&noted));
                 statistics.refused += 1;
                 statistics.last_refusal = Some(one_line(&format!("{}: {noted}", file.path.display())));
             }
@@ -250,14 +257,21 @@ impl Recording {
         let file = &mut self.files[place.file];
         let encoding = file.index.topics[place.topic].encoding.unwrap_or(Encoding::Cdr);
         let (path, at) = (file.path.clone(), file.offset(place));
-        let message = file.message(place)?;
-        let message =
-            point_cloud2::decode(&path, message, encoding, &self.options.read).map_err(|error| match error {
-                Error::Malformed { path, place, what } => {
-                    Error::Malformed { path, place: format!("byte {at}, {place} of a message of {topic}"), what }
-                }
-                other => other,
-            })?;
+        let message = match file.message(place) {
+            Ok(message) => message,
+            Err(error) => {
+                file.bytes.check()?;
+                return Err(error);
+            }
+        };
+        let decoded = point_cloud2::decode(&path, message, encoding, &self.options.read);
+        file.bytes.check()?;
+        let message = decoded.map_err(|error| match error {
+            Error::Malformed { path, place, what } => {
+                Error::Malformed { path, place: format!("byte {at}, {place} of a message of {topic}"), what }
+            }
+            other => other,
+        })?;
         let stamp = if message.stamp == 0 { place.time } else { message.stamp };
         let mut cloud = message.cloud;
         let noted = &mut self.noted[channel];

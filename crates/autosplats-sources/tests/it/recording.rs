@@ -14,6 +14,7 @@ use autosplats_cloud::{
     Axes, Error, Progress, Random,
     glam::{DMat4, DQuat, DVec3},
 };
+use autosplats_formats::ReadOptions;
 use autosplats_sources::{
     Next, Recording, RecordingOptions, Stream as _, Update, describe_recording, is_recording, point_cloud2::Encoding,
 };

@@ -85,7 +85,8 @@ fn scans<'a, T>(
 ) -> Result<Vec<T>, Error> {
     root.notes.iter().for_each(|note| job.note(note));
     if pages.cut_off() {
-        job.note(format!("the file is cut off at byte {}; what is left is read", job.bytes.len()));
+        let end = format!("byte {}", job.bytes.len());
+        job.loss(&end, format!("the file is cut off at {end}"))?;
     }
     let mut left = job.bytes.len();
     let mut done = 0.0;
@@ -105,7 +106,8 @@ fn scans<'a, T>(
         };
         match scan() {
             Ok((scan, counts)) => {
-                told.extend(losses(header, counts.values).map(|what| format!("{}: {what}", header.shown())));
+                let about = |(what, is_damage)| (format!("{}: {what}", header.shown()), is_damage);
+                told.extend(losses(header, counts.values).map(about));
                 points += counts.kept();
                 dropped.add(&counts);
                 found.push(scan);
@@ -118,20 +120,28 @@ fn scans<'a, T>(
         if points == 0 {
             return Err(job.malformed(place, format!("{scan}: {what}")));
         }
-        told.extend(faults.iter().map(|(scan, place, what)| format!("{scan} is left out: {place}: {what}")));
+        told.extend(faults.iter().map(|(scan, place, what)| (format!("{scan} is left out: {place}: {what}"), true)));
     }
-    told.iter().take(MAX_NOTED_LOSSES).for_each(|note| job.note(note));
+    for (loss, is_damage) in told.iter().take(MAX_NOTED_LOSSES) {
+        if *is_damage {
+            job.loss("scans", loss)?;
+        } else {
+            job.note(loss);
+        }
+    }
     if told.len() > MAX_NOTED_LOSSES {
-        job.note(format!("{} more losses in scans", told.len() - MAX_NOTED_LOSSES));
+        job.loss("scans", format!("{} more losses in scans", told.len() - MAX_NOTED_LOSSES))?;
     }
     dropped.note(job);
     Ok(found)
 }
 
-/// Descriptions of what is missing or not read of a scan.
-fn losses(header: &ScanHeader, count: usize) -> impl Iterator<Item = String> {
+/// Descriptions of what is missing or not read of a scan, each with whether the file is damaged.
+fn losses(header: &ScanHeader, count: usize) -> impl Iterator<Item = (String, bool)> {
     let points = header.points;
     let cut = ((count as u64) < points).then(|| format!("the data end after {count} of {points} points"));
     let text = header.elements.iter().any(|element| element.stored == element::Stored::Text);
-    header.pose_note.clone().into_iter().chain(cut).chain(text.then(|| "values that are text are left out".into()))
+    let text = text.then(|| "values that are text are left out".into());
+    let note = |what| (what, false);
+    header.pose_note.clone().into_iter().map(note).chain(cut.map(|what| (what, true))).chain(text.map(note))
 }

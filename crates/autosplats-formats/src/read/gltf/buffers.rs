@@ -79,6 +79,14 @@ impl<'a> Buffers<'a> {
         self.loaded.get(index)?.as_ref().map(Data::bytes)
     }
 
+    /// What was made of the buffers, unless one of the other files changed meanwhile.
+    pub(super) fn checked<T>(&self, made: Result<T, Error>) -> Result<T, Error> {
+        self.loaded.iter().flatten().fold(made, |made, data| match data {
+            Data::Beside(bytes) => bytes.checked(made),
+            _ => made,
+        })
+    }
+
     /// Bytes of all buffers in other files.
     pub(super) fn len_beside(&self) -> usize {
         let beside = |data: &Data<'_>| if let Data::Beside(bytes) = data { bytes.len() } else { 0 };
@@ -142,11 +150,11 @@ fn beside(job: &Job<'_>, place: &str, uri: &str) -> Result<Bytes, Error> {
         return Err(job.malformed(place, what));
     }
     let path: PathBuf = folder(job).join(relative);
-    let io = |source| Error::Io { path: path.clone(), source };
-    if !std::fs::metadata(&path).map_err(io)?.is_file() {
+    let metadata = std::fs::metadata(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
+    if !metadata.is_file() {
         return Err(job.malformed(place, format!("'{}' is not a file", excerpt(uri.as_bytes()))));
     }
-    Bytes::open(&path).map_err(io)
+    Bytes::open(&path)
 }
 
 fn percent_decoded(text: &str) -> Vec<u8> {

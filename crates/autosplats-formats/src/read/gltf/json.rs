@@ -3,11 +3,14 @@
 
 use std::borrow::Cow;
 
-use autosplats_cloud::{Error, guard};
+use autosplats_cloud::{Error, check_memory, guard};
 use glam::{DMat4, DQuat, DVec3};
 use serde::{Deserialize, de::IgnoredAny};
 
 use super::super::Job;
+
+/// Bytes of memory that a byte of the text takes at most.
+const BYTES_PER_BYTE: u64 = 64;
 
 /// The whole document.
 #[derive(Deserialize)]
@@ -302,7 +305,11 @@ impl<'a> Container<'a> {
     }
 
     pub(super) fn root(&self, job: &Job<'_>) -> Result<Root<'a>, Error> {
-        job.check_memory(self.json.len(), 64)?;
+        // What begins otherwise fails at its first character.
+        if self.json.trim_ascii_start().starts_with(b"{") {
+            let name = job.path.file_name().unwrap_or_default().to_string_lossy();
+            check_memory(&format!("the JSON of {name}"), (self.json.len() as u64).saturating_mul(BYTES_PER_BYTE))?;
+        }
         let parsed: serde_json::Result<Root<'a>> =
             guard(|| Ok(serde_json::from_slice(self.json))).map_err(|what| job.malformed("JSON", what))?;
         let root = parsed.map_err(|error| {

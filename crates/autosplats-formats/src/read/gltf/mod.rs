@@ -84,16 +84,21 @@ pub(super) fn read_at(job: &Job<'_>, seconds: Option<f64>) -> Result<Contents, E
     let plan = Plan::of(job, &root, pose.as_ref())?;
     let buffers = Buffers::load(job, &root, container.chunk, wanted(job, &root, &plan))?;
     plan.check_size(job, job.bytes.len().saturating_add(buffers.len_beside()))?;
+    buffers.checked(contents(job, &root, &plan, &buffers))
+}
+
+/// The points and triangles of a plan.
+fn contents(job: &Job<'_>, root: &Root<'_>, plan: &Plan<'_>, buffers: &Buffers<'_>) -> Result<Contents, Error> {
     plan.notes.iter().for_each(|note| job.note(note));
     if plan.shown.is_empty() {
         job.note("the scene shows no mesh");
     }
-    let mut points = Points::new(job, &root, &plan)?;
+    let mut points = Points::new(job, root, plan)?;
     let mut faces = Faces::new(plan.points);
     for (index, shown) in plan.shown.iter().enumerate() {
         let done = 0.7 * index as f32 / plan.shown.len() as f32;
         job.tick(done)?;
-        let scene = Scene { job, root: &root, buffers: &buffers, part: part(done) };
+        let scene = Scene { job, root, buffers, part: part(done) };
         if !shown.shared {
             points.add(&scene, shown)?;
         }

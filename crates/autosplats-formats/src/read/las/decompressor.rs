@@ -3,7 +3,7 @@
 use std::io::Cursor;
 
 use laz::{
-    DecompressionSelection, LazItem, LazItemType,
+    DecompressionSelection, LasZipError, LazItem, LazItemType,
     record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor},
 };
 
@@ -28,11 +28,19 @@ pub(super) fn selecting<'a>(
     Ok(decompressor)
 }
 
+/// What the crate says is wrong, without the names of its types.
+pub(super) fn why(error: &LasZipError) -> String {
+    match error {
+        LasZipError::IoError(error) => error.to_string(),
+        error => error.to_string(),
+    }
+}
+
 /// Makes a decompressor of all values. Items on which damage would overflow the crate's stack are decoded by this
 /// project's code.
 pub(super) fn decompressor<'a>(items: &[LazItem], chunk: &'a [u8]) -> Result<Decompressor<'a>, String> {
     let theirs = |decompressor: &mut dyn RecordDecompressor<Cursor<&'a [u8]>>, item: LazItem| {
-        decompressor.set_fields_from(&vec![item]).map_err(|error| error.to_string())
+        decompressor.set_fields_from(&vec![item]).map_err(|error| why(&error))
     };
     if layered(items) {
         let mut decompressor = LayeredPointRecordDecompressor::new(Cursor::new(chunk));

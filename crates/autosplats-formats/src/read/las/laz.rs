@@ -19,7 +19,7 @@ use super::super::Job;
 use super::{
     chunks::{Chunk, Chunks, Look, MAX_RATIO, layers},
     columns::{BATCH, Columns, Piece, preview},
-    decompressor::{Decompressor, DynDecompressor, layered, selecting},
+    decompressor::{Decompressor, DynDecompressor, layered, selecting, why},
     header::Header,
     records::Records,
 };
@@ -288,7 +288,7 @@ fn compression(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Result<
         return Err(job.malformed(format!("byte {}", header.records.0), what));
     };
     let fail = |what| job.malformed(format!("byte {}", record.at), format!("bad compression record ({what})"));
-    let vlr = guard(|| LazVlr::from_buffer(record.data).map_err(|error| error.to_string())).map_err(fail)?;
+    let vlr = guard(|| LazVlr::from_buffer(record.data).map_err(|error| why(&error))).map_err(fail)?;
     // The first number is the compressor: 1 is a single run, as the oldest writers made; 2 and 3 are chunks.
     match (record.data[0], layered(vlr.items())) {
         (1, false) => Ok((vlr, false)),
@@ -325,7 +325,7 @@ pub(super) fn decompress(
     len: usize,
 ) -> Result<(), (usize, String)> {
     for (index, record) in records.chunks_exact_mut(len).enumerate() {
-        let damaged = |error| format!("the compressed data are damaged ({error}); copy the file again");
+        let damaged = |error: std::io::Error| format!("the compressed data are damaged ({error}); copy the file again");
         decompressor.decompress_next(record).map_err(|error| (index, damaged(error)))?;
     }
     Ok(())

@@ -121,6 +121,9 @@ fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
     let colors = shape.color_bytes(&header, exact);
     let fields: usize = dimensions.iter().map(Dimension::size).sum();
     job.check_memory(points, if exact { 24 } else { 12 } + colors + fields)?;
+    if let Some(loss) = cut_off(lost, header.points).filter(|_| job.options.whole) {
+        job.loss(CUT, loss)?;
+    }
     let mut columns = Columns::new(&header, origin, exact, dimensions, points, shape.colors)?;
     let (damaged, more) = match &compressed {
         Some(compressed) => compressed.fill(job, &mut columns)?,
@@ -139,24 +142,35 @@ fn points(job: &Job<'_>, shape: &Shape<'_>) -> Result<Decoded, Error> {
     if more {
         notes.push(format!("the header states {claimed} points, but the compressed data hold more; they are left out"));
     }
-    notes.extend(cut_off(lost, claimed));
-    let damaged = damaged.iter().map(|range| range.len() as u64).sum::<u64>();
-    notes.extend(damage(damaged, claimed));
-    notes.extend(after);
     notes.iter().for_each(|note| job.note(note));
+    let damaged = damaged.iter().map(|range| range.len() as u64).sum::<u64>();
+    tell_lost(job, lost, damaged, claimed)?;
+    after.iter().for_each(|note| job.note(note));
     let cloud = cloud.with_crs(crs).with_resolution(header.scale.abs());
     Ok(Decoded { cloud, levels, lost: lost + damaged })
 }
 
-/// Note on points that the file ends before.
+/// Place of points that the file ends before.
+const CUT: &str = "end of the file";
+
+/// The loss of points that the file ends before.
 fn cut_off(lost: u64, claimed: u64) -> Option<String> {
-    (lost > 0).then(|| format!("the file is cut off: {lost} of {claimed} points are lost; copy it again"))
+    (lost > 0).then(|| format!("the file is cut off: {lost} of {claimed} points are lost"))
 }
 
-/// Note on points that cannot be decompressed.
-fn damage(lost: u64, claimed: u64) -> Option<String> {
-    (lost > 0).then(|| format!("compressed data are damaged: {lost} of {claimed} points are lost; copy the file again"))
+/// The loss of points that cannot be decompressed.
+pub(crate) fn damage(lost: u64, claimed: u64) -> Option<String> {
+    (lost > 0).then(|| format!("compressed data are damaged: {lost} of {claimed} points are lost"))
 }
+
+/// Tells how many of the points the file ends before, and how many cannot be decompressed.
+fn tell_lost(job: &Job<'_>, cut: u64, damaged: u64, claimed: u64) -> Result<(), Error> {
+    cut_off(cut, claimed).map_or(Ok(()), |loss| job.loss(CUT, loss))?;
+    damage(damaged, claimed).map_or(Ok(()), |loss| job.loss(DAMAGED, loss))
+}
+
+/// Place of points that cannot be decompressed.
+pub(crate) const DAMAGED: &str = "compressed data";
 
 /// The number of complete records, and the number of missing ones.
 fn complete(job: &Job<'_>, header: &Header) -> Result<(usize, u64), Error> {

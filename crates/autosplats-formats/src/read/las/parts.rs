@@ -13,10 +13,10 @@ use glam::DVec3;
 use super::{
     Job, Opened, Shape,
     columns::{Colors, Columns, ValueFacts},
-    cut_off, damage,
     dimension::Dimension,
     header::Header,
     stream::{Space, Stream},
+    tell_lost,
 };
 use crate::read::{
     opened::Reader,
@@ -43,6 +43,9 @@ pub(in super::super) fn open(job: &Job<'_>, _file: &Reader<'_>) -> Result<Option
     let Opened { header, dimensions, lost, crs, origin, notes: [notes, after], .. } =
         super::open(job, &Shape::default())?;
     let (claimed, points) = (header.points, stream.facts.points);
+    if job.options.whole {
+        tell_lost(job, lost, 0, claimed)?;
+    }
     let parts = LasParts {
         stream,
         header,
@@ -67,9 +70,9 @@ pub(in super::super) fn open(job: &Job<'_>, _file: &Reader<'_>) -> Result<Option
         return Err(job.malformed("point 1", why));
     }
     let damaged = points - seen.points as u64;
-    let about = [facts.narrow_note(), cut_off(lost, claimed), damage(damaged, claimed)];
-    let all = notes.into_iter().chain(about.into_iter().flatten()).chain(after);
-    all.for_each(|note| job.note(note));
+    notes.iter().chain(&facts.narrow_note()).for_each(|note| job.note(note));
+    tell_lost(job, lost, damaged, claimed)?;
+    after.iter().for_each(|note| job.note(note));
     let pieces = Box::new(LasParts { facts, ..parts });
     Ok(Some(Opening { pieces, seen, scans: Vec::new(), crs }))
 }

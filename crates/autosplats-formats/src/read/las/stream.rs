@@ -20,7 +20,7 @@ use laz::DecompressionSelection;
 use super::{
     Job,
     chunks::Look,
-    complete, coordinates,
+    complete, coordinates, cut_off,
     decompressor::{layered, selecting},
     header::Header,
     laz::{Compressed, Layout, decompress},
@@ -69,6 +69,8 @@ pub(crate) struct Facts {
     /// Descriptions of the extra bytes.
     pub(crate) extras: Vec<[u8; EXTRA_DESCRIPTOR]>,
     pub(crate) notes: Vec<String>,
+    /// The loss of points that the file ends before.
+    pub(crate) cut: Option<String>,
 }
 
 /// Records that are read together.
@@ -97,14 +99,19 @@ impl Stream {
     pub(crate) fn open(path: &Path) -> Result<Option<Self>, Error> {
         let io = |source| Error::Io { path: path.into(), source };
         let stamp = stamp(&File::open(path).map_err(io)?).map_err(io)?;
-        let bytes = Bytes::open(path).map_err(io)?;
+        let bytes = Bytes::open(path)?;
         if !bytes.starts_with(b"LASF") {
             return Ok(None);
         }
+        bytes.checked(Self::of(path, stamp, &bytes)).map(Some)
+    }
+
+    /// The records in the bytes of a file.
+    fn of(path: &Path, stamp: (u64, Option<SystemTime>), bytes: &[u8]) -> Result<Self, Error> {
         let options = ReadOptions::default();
-        let job = Job { path, progress: &(), bytes: &bytes, options: &options, triangles: false };
+        let job = Job { path, progress: &(), bytes, options: &options, triangles: false };
         let mut header = Header::read(&job)?;
-        let records = Records::read(&bytes, &header);
+        let records = Records::read(bytes, &header);
         let meaning = coordinates::of(&header, &records);
         let mut notes: Vec<String> = records.notes.iter().cloned().chain(meaning.notes).collect();
         let (layout, runs, lost) = if header.compressed {
@@ -143,9 +150,6 @@ impl Stream {
             };
             (None, (0..points).step_by(PIECE).map(run).collect(), lost)
         };
-        if lost > 0 {
-            notes.push(format!("the file is cut off: {lost} of {} points are lost; copy it again", header.points));
-        }
         if las::has_waveforms(header.format) {
             notes.push("waveforms are not kept".into());
         }
@@ -163,8 +167,9 @@ impl Stream {
             crs: meaning.crs,
             extras: described.flat_map(|record| record.data.as_chunks().0).copied().collect(),
             notes,
+            cut: cut_off(lost, header.points),
         };
-        Ok(Some(Self { path: path.into(), stamp, facts, layout, runs }))
+        Ok(Self { path: path.into(), stamp, facts, layout, runs })
     }
 
     /// Number of runs.
@@ -198,7 +203,7 @@ impl Stream {
         let Space { packed, records } = space;
         let map;
         let bytes = if len > MAX_READ {
-            map = Bytes::open(&self.path).map_err(io)?;
+            map = Bytes::open(&self.path)?;
             map.get(run.bytes.start as usize..run.bytes.end as usize).ok_or_else(changed)?
         } else {
             packed.resize(len as usize, 0);

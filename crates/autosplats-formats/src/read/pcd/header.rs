@@ -105,9 +105,10 @@ impl Header {
             if at >= job.bytes.len() {
                 return Err(fail("the file ends inside the header, before DATA; copy it again".into()));
             }
-            let end = line_end(job.bytes, at);
+            // A longer line is refused, whatever follows.
+            let end = line_end(&job.bytes[..job.bytes.len().min(at + MAX_HEADER_LINE + 1)], at);
             if end - at > MAX_HEADER_LINE {
-                return Err(fail(format!("a header line of {} bytes", end - at)));
+                return Err(fail(format!("a header line of more than {MAX_HEADER_LINE} bytes")));
             }
             let words = words(&job.bytes[at..end]);
             at = after_line_end(job.bytes, at);

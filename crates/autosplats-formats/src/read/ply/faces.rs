@@ -62,10 +62,10 @@ impl Reader<'_> {
     }
 
     /// Tells that the file ends in a face; `complete` is the number of complete faces.
-    fn tell_cut_off(&self, complete: usize) {
+    fn tell_cut_off(&self, complete: usize) -> Result<(), Error> {
         let count = self.element.count;
-        let lost = count - complete;
-        self.job.note(format!("the file is cut off: {lost} of {count} faces are lost; copy it again"));
+        let (lost, end) = (count - complete, format!("byte {}", self.job.bytes.len()));
+        self.job.loss(&end, format!("the file is cut off: {lost} of {count} faces are lost"))
     }
 
     fn binary(&self, start: usize, big_endian: bool, faces: &mut Faces) -> Result<(), Error> {
@@ -86,8 +86,7 @@ impl Reader<'_> {
                 };
                 let raw = bytes.get(at..).and_then(|rest| rest.get(..count.size()));
                 let Some(raw) = raw else {
-                    self.tell_cut_off(face);
-                    return Ok(());
+                    return self.tell_cut_off(face);
                 };
                 let Some(len) = list_len(raw, big_endian, count) else {
                     return Err(self
@@ -97,8 +96,7 @@ impl Reader<'_> {
                 at += count.size();
                 let end = len.checked_mul(size).and_then(|len| at.checked_add(len)).filter(|&end| end <= bytes.len());
                 let Some(end) = end else {
-                    self.tell_cut_off(face);
-                    return Ok(());
+                    return self.tell_cut_off(face);
                 };
                 if index == self.list {
                     let corner = |raw| corner(raw, big_endian, property.scalar);
@@ -113,8 +111,7 @@ impl Reader<'_> {
                 at = end;
             }
             if at > bytes.len() {
-                self.tell_cut_off(face);
-                return Ok(());
+                return self.tell_cut_off(face);
             }
         }
         Ok(())
@@ -129,7 +126,7 @@ impl Reader<'_> {
             Some(end) if end < job.bytes.len() || last == end || !unfinished() => end,
             _ => {
                 // Digits of an unfinished last line may be missing.
-                self.tell_cut_off(lines::lines(job.bytes, &(start..last)).count());
+                self.tell_cut_off(lines::lines(job.bytes, &(start..last)).count())?;
                 last
             }
         };

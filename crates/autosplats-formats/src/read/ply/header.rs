@@ -78,7 +78,7 @@ impl Header {
             let (line, next) = header_line(bytes, start);
             start = next;
             if line.len() > MAX_HEADER_LINE {
-                return Err(fail(format!("a header line of {} bytes", line.len())));
+                return Err(fail(format!("a header line of more than {MAX_HEADER_LINE} bytes")));
             }
             let line = String::from_utf8_lossy(line);
             let mut words = line.split_ascii_whitespace();
@@ -134,7 +134,8 @@ impl Header {
 
 /// A line of the header, and the start of the next. Lines end in LF, CR LF or, in old files, a bare CR.
 fn header_line(bytes: &[u8], start: usize) -> (&[u8], usize) {
-    let rest = &bytes[start..];
+    // A longer line is refused, whatever follows.
+    let rest = &bytes[start..bytes.len().min(start + MAX_HEADER_LINE + 2)];
     let end = rest.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(rest.len());
     let ending = if rest[end..].starts_with(b"\r\n") { 2 } else { 1 };
     (&rest[..end], (start + end + ending).min(bytes.len()))

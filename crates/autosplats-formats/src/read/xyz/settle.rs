@@ -292,7 +292,8 @@ fn check_promise(
     }
     let all = first.saturating_add(between);
     if rows < all {
-        job.note(format!("the counts of points add up to {all}, but there are {rows}; the file may be cut off"));
+        let loss = format!("the counts of points add up to {all}, but there are {rows}; the file may be cut off");
+        job.loss(&text.line(text.len())?, loss)?;
     }
     Ok(())
 }

@@ -87,6 +87,8 @@ pub struct TreeOptions {
     pub keep: Option<PointFilter>,
     /// Keep points of LAS files at (0, 0, 0), which scanners write for missing returns.
     pub keep_no_returns: bool,
+    /// Take only whole LAS files: one that is cut off or damaged is an error.
+    pub whole: bool,
 }
 
 /// A tree that was made.
@@ -141,7 +143,7 @@ fn make(
     let sources = inputs.into_par_iter().map(Source::open).collect::<Result<Vec<_>, Error>>()?;
     let mut holds = Vec::new();
     for source in &sources {
-        source.tell(several, progress);
+        source.tell(several, options.whole, progress)?;
         holds.push(source.holds(progress)?);
     }
     let points: u64 = holds.iter().map(|input| input.points).sum();
@@ -271,7 +273,7 @@ impl Making<'_> {
             known = Some(bounds);
         };
         for source in sources {
-            source.tell_lost(self.several, self.progress)?;
+            source.tell_lost(self.several, self.options.whole, self.progress)?;
         }
         let chunks = parts(&frame, grid, &spill, self.progress)?;
         let total: u64 = chunks.iter().map(|chunk| chunk.points).sum();

@@ -5,7 +5,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use autosplats_cloud::{Clouds, Crs, Error, Outline, PointCloud, Progress, lock};
+use autosplats_cloud::{Clouds, Crs, Error, Outline, PointCloud, Progress, lock, tell_loss};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     las,
-    read::las::{Facts, Space, Stream},
+    read::las::{DAMAGED, Facts, Space, Stream, damage},
     write::{
         job::Quiet,
         las::{Plan, Shape, Survey, finite},
@@ -82,11 +82,13 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Tells what is odd about the input.
-    pub(super) fn tell(&self, several: bool, progress: &dyn Progress) {
-        if let Self::Las(stream) = self {
-            stream.facts.notes.iter().for_each(|note| progress.note(&about(&stream.path, several, note)));
-        }
+    /// Tells what is odd about the input, and what it has lost.
+    pub(super) fn tell(&self, several: bool, whole: bool, progress: &dyn Progress) -> Result<(), Error> {
+        let Self::Las(stream) = self else { return Ok(()) };
+        stream.facts.notes.iter().for_each(|note| progress.note(&about(&stream.path, several, note)));
+        let Some(loss) = &stream.facts.cut else { return Ok(()) };
+        let loss = if whole { loss.clone() } else { about(&stream.path, several, loss) };
+        tell_loss(&stream.path, "end of the file", &loss, whole, progress)
     }
 
     pub(super) fn prepare(
@@ -312,16 +314,16 @@ impl Prepared<'_> {
     }
 
     /// Tells which points could not be read, and which were left out.
-    pub(super) fn tell_lost(&self, several: bool, progress: &dyn Progress) -> Result<(), Error> {
+    pub(super) fn tell_lost(&self, several: bool, whole: bool, progress: &dyn Progress) -> Result<(), Error> {
         let Source::Las(stream) = &self.source else { return Ok(()) };
         let (lost, why) = std::mem::take(&mut *lock(&self.lost));
         let all = stream.facts.points;
         if lost > 0 && lost == all {
             return Err(Error::malformed(&stream.path, "point 1", why));
         }
-        if lost > 0 {
-            let note = format!("compressed data are damaged: {lost} of {all} points are lost; copy the file again");
-            progress.note(&about(&stream.path, several, &note));
+        if let Some(loss) = damage(lost, all) {
+            let loss = if whole { loss } else { about(&stream.path, several, &loss) };
+            tell_loss(&stream.path, DAMAGED, &loss, whole, progress)?;
         }
         let nowhere = self.chosen.nowhere();
         if nowhere > 0 {

@@ -87,3 +87,29 @@ fn claims_of_gigabytes_are_not_believed() {
         }
     }
 }
+
+#[test]
+fn what_is_lost_is_an_error_if_only_whole_recordings_are_taken() {
+    let (topics, messages) = ten(Encoding::Cdr);
+    let whole = mcap(&topics, &messages, Style::of("zstd"));
+    let read = ReadOptions { whole: true, ..ReadOptions::default() };
+    let options = RecordingOptions { read, ..RecordingOptions::default() };
+    assert!(open("a.mcap", &whole, &options).is_ok(), "nothing is lost");
+    let told = open("a.mcap", &whole[..whole.len() / 2], &options).map(drop).unwrap_err().to_string();
+    assert!(told.starts_with("a.mcap: byte ") && told.ends_with("or take what is left with --salvage"), "{told}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_recording_that_is_cut_while_it_is_played() {
+    let (topics, messages) = ten(Encoding::Cdr);
+    let bytes = mcap(&topics, &messages, Style::of("none"));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    std::fs::write(&path, &bytes).unwrap();
+    let mut recording = Recording::open(&path, &RecordingOptions::default(), &()).unwrap();
+    std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(0).unwrap();
+    let (updates, refusals) = play(&mut recording);
+    assert_eq!((updates.len(), refusals.len()), (0, 10), "nothing is there any more");
+    assert!(refusals.iter().all(|told| told.contains("the file changed while it was read")), "{refusals:?}");
+}

@@ -1,19 +1,37 @@
 //! Available memory.
 
-use std::fs::read_to_string;
+mod limits;
 
+use std::{fs::read_to_string, path::Path, sync::OnceLock};
+
+use self::limits::{Groups, address_space};
 use crate::Error;
 
-/// Bytes that can be allocated without swapping, if the system states them (Linux only).
+/// Bytes that can be allocated without swapping, and within the limits of this process: its control groups of either
+/// version (containers, services, batch jobs) and its address space (`ulimit -v`). `None` if the system states nothing.
 pub fn available_memory() -> Option<u64> {
-    let meminfo = read_to_string("/proc/meminfo").ok()?;
-    let line = meminfo.lines().find(|line| line.starts_with("MemAvailable:"))?;
-    let free = line.split_whitespace().nth(1)?.parse::<u64>().ok()?.checked_mul(1024)?;
-    // A container has its own limit; the file says "max" if there is none.
-    let bytes = |file: &str| read_to_string(file).ok()?.trim().parse::<u64>().ok();
-    let limit = bytes("/sys/fs/cgroup/memory.max");
-    let used = bytes("/sys/fs/cgroup/memory.current").unwrap_or(0);
-    Some(limit.map_or(free, |limit| free.min(limit.saturating_sub(used))))
+    let root = Path::new("/");
+    let group = groups().room().map(|[_, free]| free);
+    [of_machine(root, "MemAvailable:"), group, address_space(root)].into_iter().flatten().min()
+}
+
+/// Bytes of memory of the machine, or of the control groups of this process if they allow less (Linux only).
+pub fn total_memory() -> Option<u64> {
+    let limit = groups().room().map(|[limit, _]| limit);
+    of_machine(Path::new("/"), "MemTotal:").map(|total| limit.map_or(total, |limit| total.min(limit)))
+}
+
+/// The groups of this process. That it moves to another one while it runs is rare.
+fn groups() -> &'static Groups {
+    static GROUPS: OnceLock<Groups> = OnceLock::new();
+    GROUPS.get_or_init(|| Groups::of_process(Path::new("/")))
+}
+
+/// A number of bytes that the system states of its memory (Linux only).
+fn of_machine(root: &Path, name: &str) -> Option<u64> {
+    let meminfo = read_to_string(root.join("proc/meminfo")).ok()?;
+    let kibibytes = meminfo.lines().find_map(|line| line.strip_prefix(name)?.trim().strip_suffix(" kB"))?;
+    kibibytes.parse::<u64>().ok()?.checked_mul(1024)
 }
 
 /// Memory of this process in bytes, now and at most since it began, if the system states it (Linux only).
@@ -32,13 +50,14 @@ pub fn own_memory() -> Option<[u64; 2]> {
 const USUAL: [u64; 2] = [256 << 20, 2 << 30];
 
 /// Memory in bytes for work of any size that may choose how much it takes: a quarter of what is available, from 256 MiB
-/// to 2 GiB.
+/// to 2 GiB; but no more than half of what is available.
 pub fn usual_memory() -> u64 {
-    (available_memory().unwrap_or(USUAL[1]) / 4).clamp(USUAL[0], USUAL[1])
+    let available = available_memory().unwrap_or(4 * USUAL[1]);
+    (available / 4).clamp(USUAL[0], USUAL[1]).min(available / 2)
 }
 
 /// Requests up to this size, in bytes, are not checked: asking the system takes longer than reading such a file.
-const SMALL: u64 = 64 << 20;
+const SMALL: u64 = 8 << 20;
 
 /// Fails if more memory is needed than is available. Systems promise memory that they do not have and then kill the
 /// process that touches it. Only a check in advance fails with a message.
