@@ -77,7 +77,7 @@ def frames(
         ArgumentError: If an argument is out of its range.
         FileNotFoundError, FormatError, EmptyError: If the source cannot be played.
     """
-    name = os.fspath(source) if "://" in os.fspath(source) or "scene:" in os.fspath(source) else os.path.abspath(source)
+    name = _absolute(source)
     options = dict(playing or {})
     count = len(play(name, **options))
     first, last = (0, count - 1) if frames is None else frames
@@ -184,9 +184,13 @@ def _still(
     backend: Literal["auto", "cpu", "gpu"],
     look: Mapping[str, Any],
 ) -> Pictures:
-    name = os.fspath(points)
-    name = name if "://" in name or name.startswith("scene:") else os.path.abspath(name)
-    return Pictures(name, None, checked_size(size), "auto", None, axes, _checked(look), backend)
+    return Pictures(_absolute(points), None, checked_size(size), "auto", None, axes, _checked(look), backend)
+
+
+def _absolute(source: str | os.PathLike[str]) -> str:
+    """The name of a source, wherever a task runs."""
+    name = os.fspath(source)
+    return name if "://" in name or name.startswith("scene:") else os.path.abspath(name)
 
 
 def _checked(look: Mapping[str, Any]) -> dict[str, Any]:
