@@ -115,7 +115,7 @@ def test_a_malformed_tile_fails_alone(cluster, tmp_path):
 
 
 def test_a_straggler_is_started_once_more(cluster, tiles, alone, tmp_path, monkeypatch):
-    monkeypatch.setattr(engine, "_SLOW_SECONDS", 3.0)
+    monkeypatch.setattr(engine, "_SLOW_SECONDS", 8.0)
     job = spoil(jobs.tile_normals(tiles, tmp_path / "out"), {"t11.laz": "hang", "t20.laz": "slow"})
     marks = {}
 
