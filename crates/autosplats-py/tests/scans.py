@@ -111,6 +111,18 @@ class Spoiled(Task):
             time.sleep(0.1)
 
 
+@dataclass(frozen=True)
+class Threads(Task):
+    """A task whose points are the number of its threads."""
+
+    def outputs(self) -> Sequence[str]:
+        return [f"{self.work}.output"]
+
+    def run(self, device: int | str | None) -> tuple[int, int]:
+        Path(self.outputs()[0]).touch()
+        return autosplats.num_threads(), 0
+
+
 def spoil(job: Job, faults: dict[str, str]) -> Job:
     """The job with faults in tasks of these names."""
 

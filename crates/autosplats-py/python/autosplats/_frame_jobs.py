@@ -21,8 +21,8 @@ from ._job import Job, work_of
 from ._play import play
 from ._task import digest
 
-#: Usual number of consecutive pictures of a task.
-_CHUNK = 16
+#: Most consecutive pictures of a task, and number of tasks that is enough for many machines.
+_CHUNK, _TASKS = 16, 64
 #: Arguments of `render` that pictures share.
 _LOOK = (
     "color",
@@ -50,7 +50,7 @@ def frames(
     view: View = "auto",
     axes: Axes | None = None,
     backend: Literal["auto", "cpu", "gpu"] = "auto",
-    chunk: int = _CHUNK,
+    chunk: int | None = None,
     playing: Mapping[str, Any] | None = None,
     **look: Any,
 ) -> Job:
@@ -68,7 +68,8 @@ def frames(
         view: The side to look from, if no camera is given.
         axes: Which axis points up.
         backend: "cpu", "gpu", or "auto".
-        chunk: Number of consecutive pictures of a task.
+        chunk: Number of consecutive pictures of a task; by default up to 16, so that there are 64 tasks if there are as
+            many pictures.
         playing: Arguments of `autosplats.play`, such as `dict(topics=["/points"], decay=0.5)`.
         **look: Arguments of `autosplats.render`, such as `color="height"` or `legend=True`. `supersample` is 1 by
             default.
@@ -77,7 +78,7 @@ def frames(
         ArgumentError: If an argument is out of its range.
         FileNotFoundError, FormatError, EmptyError: If the source cannot be played.
     """
-    name = os.fspath(source) if "://" in os.fspath(source) or "scene:" in os.fspath(source) else os.path.abspath(source)
+    name = _absolute(source)
     options = dict(playing or {})
     count = len(play(name, **options))
     first, last = (0, count - 1) if frames is None else frames
@@ -104,7 +105,7 @@ def fly(
     size: Size = (1280, 800),
     axes: Axes | None = None,
     backend: Literal["auto", "cpu", "gpu"] = "auto",
-    chunk: int = _CHUNK,
+    chunk: int | None = None,
     **look: Any,
 ) -> Job:
     """A job that renders points that do not move, with a camera for each picture.
@@ -112,7 +113,8 @@ def fly(
     Args:
         points: A file, an address or a scene.
         cameras: The camera of each picture.
-        output, size, axes, backend, chunk, look: As of `frames`.
+        output, size, axes, backend, look: As of `frames`.
+        chunk: As of `frames`, but 16 by default, since each task reads all points.
 
     Raises:
         ArgumentError: If an argument is out of its range, or there is no camera.
@@ -131,7 +133,7 @@ def turntable(
     view: View = "auto",
     axes: Axes | None = None,
     backend: Literal["auto", "cpu", "gpu"] = "auto",
-    chunk: int = _CHUNK,
+    chunk: int | None = None,
     **look: Any,
 ) -> Job:
     """A job that renders points from all around: a camera that sees them all goes once around them.
@@ -140,7 +142,8 @@ def turntable(
         points: A file, an address or a scene, which is read here once, to place the camera.
         count: Number of pictures, at least 1.
         view: The side of the first picture.
-        output, size, axes, backend, chunk, look: As of `frames`.
+        output, size, axes, backend, look: As of `frames`.
+        chunk: As of `frames`, but 16 by default, since each task reads all points.
 
     Raises:
         ArgumentError: If an argument is out of its range.
@@ -184,9 +187,13 @@ def _still(
     backend: Literal["auto", "cpu", "gpu"],
     look: Mapping[str, Any],
 ) -> Pictures:
-    name = os.fspath(points)
-    name = name if "://" in name or name.startswith("scene:") else os.path.abspath(name)
-    return Pictures(name, None, checked_size(size), "auto", None, axes, _checked(look), backend)
+    return Pictures(_absolute(points), None, checked_size(size), "auto", None, axes, _checked(look), backend)
+
+
+def _absolute(source: str | os.PathLike[str]) -> str:
+    """The name of a source, wherever a task runs."""
+    name = os.fspath(source)
+    return name if "://" in name or name.startswith("scene:") else os.path.abspath(name)
 
 
 def _checked(look: Mapping[str, Any]) -> dict[str, Any]:
@@ -200,12 +207,14 @@ def _checked(look: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _picture_job(
-    pictures: Pictures, numbers: range, cameras: Sequence[Camera], output: str | os.PathLike[str], chunk: int
+    pictures: Pictures, numbers: range, cameras: Sequence[Camera], output: str | os.PathLike[str], chunk: int | None
 ) -> Job:
     folder, name = os.path.split(os.path.abspath(output))
     if re.fullmatch(r"[^%]*%0?\d*d[^%]*", name) is None:
         raise ArgumentError(f"output is '{output}', must be a name with a number, such as f_%05d.png")
     files = [(number, os.path.join(folder, name % number)) for number in numbers]
+    if chunk is None:
+        chunk = _CHUNK if pictures.playing is None else max(1, min(_CHUNK, len(files) // _TASKS))
     if chunk < 1:
         raise ArgumentError(f"chunk is {chunk}, must be 1 or more")
     plain = os.path.join(folder, os.path.splitext(name)[0])

@@ -129,12 +129,13 @@ def _pictures(commands: Any, name: str, about: str) -> argparse.ArgumentParser:
     command.add_argument("--size", type=_size, default=(1280, 800), metavar="WxH", help="[default: 1280x800]")
     command.add_argument("--axes", help="which axis points up, such as z-up")
     command.add_argument("--backend", choices=["auto", "cpu", "gpu"], default="auto", help="[default: auto]")
-    command.add_argument("--chunk", type=int, default=16, help="pictures of a task [default: 16]")
+    command.add_argument("--chunk", type=int, metavar="COUNT", help="pictures of a task [default: up to 16]")
     command.add_argument("--color", default="auto", help="height, intensity, the name of a field ... [default: auto]")
     command.add_argument("--range", dest="value_range", type=_ends, metavar="A..B", help="ends of the colour map")
     command.add_argument("--legend", action="store_true", help="draw the colour map")
     command.add_argument("--background", metavar="COLOR", help="a CSS colour, two for a gradient, or transparent")
-    command.add_argument("--supersample", type=int, default=1, help="average this many pixels squared [default: 1]")
+    factor = "render so many times as wide and high, and average [default: 1]"
+    command.add_argument("--supersample", type=int, default=1, metavar="FACTOR", help=factor)
     return command
 
 

@@ -11,6 +11,7 @@ All machines need the same paths, by a shared file system, and this package in t
 
 from __future__ import annotations
 
+import math
 import os
 import statistics
 import sys
@@ -23,10 +24,11 @@ from . import _core
 from ._errors import ArgumentError, Error
 from ._job import Job, Progress, Report, Run, failed
 from ._task import Row, Task, run_task
+from ._threads import set_num_threads
 
 #: Tasks that wait for each that can run at once, so that no machine waits for the driver.
 _AHEAD = 2
-#: Seconds of waiting between two looks at stragglers and at the size of the cluster.
+#: Seconds between two looks at stragglers and at the size of the cluster.
 _STEP = 1.0
 #: How many times as long as others a task takes before it is started once more, and at least how many seconds.
 _SLOW, _SLOW_SECONDS = 3.0, 10.0
@@ -133,6 +135,7 @@ class _Engine:
     ) -> None:
         self._ray, self._run, self._speculate = ray, started, speculate
         self._memory = memory
+        self._threads = max(int(num_cpus), 1)
         #: What a task takes, by Ray's names.
         self._wanted = {"num_cpus": num_cpus, "num_gpus": num_gpus}
         self._remote = ray.remote(max_retries=retries, retry_exceptions=[OSError])(_on_worker)
@@ -147,22 +150,26 @@ class _Engine:
         running: dict[str, _Running] = {}
         of_copy: dict[Any, str] = {}
         self._paces.clear()
+        looked = -math.inf
+        slots = 0
 
         def start(one: _Running) -> None:
             options = {**self._wanted, "memory": self._bytes(one.task)}
-            copy = self._remote.options(**options).remote(one.task, _core.VERSION)
+            copy = self._remote.options(**options).remote(one.task, self._threads, _core.VERSION)
             one.copies.append(copy)
             of_copy[copy] = one.task.name
 
         try:
             while waiting or running:
-                self._nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
-                slots = self._slots()
+                now = time.monotonic()
+                if now - looked >= _STEP:
+                    looked = now
+                    self._nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
+                    slots = self._slots()
                 while waiting and len(running) < _AHEAD * slots:
                     one = _Running(waiting.pop())
                     running[one.task.name] = one
                     start(one)
-                now = time.monotonic()
                 for one in list(running.values())[:slots]:
                     one.begun = one.begun or now
                 free = slots - len(of_copy)
@@ -232,10 +239,11 @@ class _Engine:
         return sorted(late, key=lateness, reverse=True)
 
 
-def _on_worker(task: Task, version: str) -> Row:
-    """Performs a task in a worker of Ray, which states the number of threads by a variable of its own."""
+def _on_worker(task: Task, threads: int, version: str) -> Row:
+    """Performs a task in a worker of Ray."""
     import ray
 
+    set_num_threads(threads)
     cards = ray.get_gpu_ids()
     return run_task(task, device=_device(int(cards[0])) if cards else None, version=version)
 
