@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Clouds, Error, Output, Part, Progress as _, Spool, available_memory, check_disk, usual_memory};
-use autosplats_formats::write_clouds;
+use autosplats_formats::{ReadOptions, describe, write_clouds};
 
 use crate::args::{PartArgs, RoomArgs};
 use crate::console::Console;
@@ -104,6 +104,12 @@ pub(crate) fn parts(
     bar.report(1.0);
     let points = clouds.points().unwrap_or(points);
     Ok(Some(Parts { clouds, points, memory, folder }))
+}
+
+/// Number of points in a file that was written: some formats do not hold points without finite coordinates.
+pub(crate) fn points_in(output: &Path, written: u64) -> u64 {
+    let described = output.is_file().then(|| describe(output, &ReadOptions::default()).ok()).flatten();
+    described.and_then(|about| about.points).map_or(written, |points| points.min(written))
 }
 
 impl Parts {

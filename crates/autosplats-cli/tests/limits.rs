@@ -100,7 +100,7 @@ fn files_that_are_cut_while_they_are_read() {
                 file.set_len(whole.len() as u64 / 3).expect("cut");
             };
             let mut command = folder.command(&["info", "--scan", name]);
-            let ended = run(&mut command, takes * step / 12, cut);
+            let ended = run(&mut command, takes * step / 20, cut);
             expect(&ended, &[0, 3], name);
             told += usize::from(ended.stderr.contains("the file changed while it was read; start again"));
         }
@@ -138,15 +138,15 @@ fn limits_of_memory() {
         &["convert", "a.las", "out.ply", "--force"],
         &["normals", "a.ply", "out.ply", "--force"],
         &["render", "a.ply", "-o", "a.png", "--size", "1920x1080"],
-        &["convert", "scene:cathedral:20M", "out.ply", "--force"],
+        &["render", "scene:cathedral:30M", "-o", "a.png", "--size", "40x30"],
         &["convert", "scene:figure:300K", "out.laz", "--force"],
     ];
     for (job, arguments) in jobs.iter().enumerate() {
-        for kibibytes in ["400000", "700000", "1100000"] {
+        for kibibytes in ["400000", "1100000"] {
             let limit = format!("-v {kibibytes}");
             let ended = at_once(&mut limited(&folder, &limit, arguments));
             expect(&ended, &[0, 6], &format!("{limit}: {arguments:?}"));
-            assert!(job != 4 || kibibytes != "400000" || ended.code == 6, "300 MB of points: {ended:?}");
+            assert!(job != 4 || kibibytes != "400000" || ended.code == 6, "450 MB of points: {ended:?}");
         }
     }
     assert!(folder.list().iter().all(|name| !name.starts_with('.')), "nothing is left: {:?}", folder.list());

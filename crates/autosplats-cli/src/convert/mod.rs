@@ -11,7 +11,7 @@ use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{check_cloud_target, forced, write_cloud};
-use crate::parts::{Need, Parts, check_room, parts};
+use crate::parts::{Need, Parts, check_room, parts, points_in};
 use crate::progress::Bar;
 
 /// Bytes per point that all points at once need: all their values, with all digits, and what writing takes.
@@ -55,6 +55,7 @@ pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> 
 }
 
 fn tell(output: &Path, kept: u64, read: u64, bytes: u64, console: &Console) {
+    let kept = points_in(output, kept);
     let of = if kept < read { format!(" of {read}") } else { String::new() };
     console.tell(format_args!("{}: {kept}{of} points, {bytes} bytes", output.display()));
 }

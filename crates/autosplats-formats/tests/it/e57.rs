@@ -420,6 +420,15 @@ fn claims_that_lie_are_refused() {
 }
 
 #[test]
+fn points_that_are_nowhere_are_told() {
+    let mut places = crate::common::positions(9);
+    places[4][1] = f32::NAN;
+    let (back, notes) = round_trip(&PointCloud::new(DVec3::ZERO, places).with_axes(Axes::ZUp), &exact());
+    assert_eq!(back.len(), 8, "marked as invalid");
+    assert!(notes.iter().any(|note| note.starts_with("1 points without finite coordinates")), "{notes:?}");
+}
+
+#[test]
 fn changes_that_checksums_do_not_tell() {
     let bytes = written(&posed());
     let data: Vec<u8> = bytes.chunks(1024).flat_map(|page| &page[..1020]).copied().collect();

@@ -111,6 +111,10 @@ fn notes(job: &Job<'_>, known: &CloudFacts<'_>) {
     if is_lost {
         job.note("E57 does not store which axis is up");
     }
+    let nowhere = cloud.positions().par_iter().filter(|place| !place.iter().all(|along| along.is_finite())).count();
+    if nowhere > 0 {
+        job.note(format!("{nowhere} points without finite coordinates are marked as invalid; readers leave them out"));
+    }
     for field in cloud.fields() {
         if known.beyond.contains(&&*field.name) {
             job.note(format!("{}: integers beyond 63 bits are written as floats", field.name));

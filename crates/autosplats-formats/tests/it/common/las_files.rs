@@ -34,6 +34,7 @@ pub(crate) const EXACT: ReadOptions = ReadOptions {
     keep_no_returns: true,
     columns: None,
     keep: None,
+    whole: false,
     headers: Vec::new(),
     depth_camera: None,
 };
