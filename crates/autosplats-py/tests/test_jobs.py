@@ -101,7 +101,9 @@ def test_normals_of_boxes_of_an_octree(octree, dense, tmp_path):
 
 def test_normals_of_boxes_of_an_ept(dense, tmp_path):
     write_ept(dense, tmp_path / "scan")
-    job = jobs.tile_normals(tmp_path / "scan/ept.json", tmp_path / "out", box_points=60_000)
+    job = jobs.tile_normals(tmp_path / "scan", tmp_path / "out", box_points=60_000)
+    whole = jobs.tile_normals(tmp_path / "scan/ept.json", tmp_path / "out", box_points=60_000)
+    assert job.tasks == whole.tasks
     assert len(job.tasks) >= 4 and all(task.name.startswith("scan_") for task in job.tasks)
     job.run().raise_if_failed()
     are_exact(tmp_path / "out", dense, autosplats.estimate_normals(dense, orient="up"))

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._errors import ArgumentError, Error, FormatError
-from ._task import told
+from ._task import is_flaky, told
 
 Doubles = npt.NDArray[np.float64]
 #: A folder, a pattern, a file, an address, or a list of files.
@@ -53,7 +53,9 @@ def tiles_of(source: Source, box_points: int) -> list[Tile]:
     """The tiles of a folder, a pattern or a list of files, or the boxes of one octree."""
     if isinstance(source, (str, os.PathLike)):
         name = os.fspath(source)
-        if os.path.isdir(name):
+        if os.path.exists(os.path.join(name, "ept.json")):
+            names = [os.path.join(name, "ept.json")]
+        elif os.path.isdir(name):
             names = sorted(str(path) for path in Path(name).iterdir() if path.name.lower().endswith(_ENDINGS))
         else:
             names = sorted(glob.glob(name)) if glob.has_magic(name) and not os.path.exists(name) else [name]
@@ -89,6 +91,8 @@ def _outlined(path: str) -> Tile:
         if outline["points"] is None or outline["bounds"] is None:
             raise FormatError(f"{path}: its header states no number of points or no bounds; convert it to .laz")
     except (Error, OSError) as error:
+        if is_flaky(error):
+            raise
         return Tile(name=name, path=path, stamp="", fault=told(error))
     low, high = (np.array(corner) for corner in outline["bounds"])
     slack = _ROUNDING * (high - low).max()
