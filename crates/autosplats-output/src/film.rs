@@ -30,7 +30,7 @@ pub fn has_ffmpeg() -> bool {
 /// use autosplats_output::{Film, has_ffmpeg};
 ///
 /// if has_ffmpeg() {
-///     let mut film = Film::begin("fade.mp4".as_ref(), [64, 48], 25.0)?;
+///     let mut film = Film::begin("fade.mp4", [64, 48], 25.0)?;
 ///     for shade in 0..=255 {
 ///         let pixels = vec![[shade, shade, shade, 255]; 64 * 48];
 ///         film.add(&Image { width: 64, height: 48, pixels, ..Image::default() })?;

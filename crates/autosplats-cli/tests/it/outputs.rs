@@ -206,16 +206,6 @@ fn the_day_of_a_file_may_be_told() {
 }
 
 #[test]
-fn every_bad_input_of_several_has_one_line() {
-    let folder = Folder::with_sphere();
-    let Outcome { code, stderr, .. } = folder.run(&["info", "none.ply", "sphere.ply", "nothing.las"]);
-    assert_eq!(code, Some(3), "{stderr}");
-    let lines: Vec<&str> = stderr.lines().collect();
-    assert_eq!(lines.len(), 2, "one for each of the two: {stderr}");
-    assert!(lines[0].starts_with("error: none.ply: ") && lines[1].starts_with("error: nothing.las: "), "{stderr}");
-}
-
-#[test]
 fn names_cannot_act_on_the_terminal() {
     let folder = Folder::with_sphere();
     let odd = "a\u{1b}[31m\u{202e}b";

@@ -161,7 +161,7 @@ pub(super) fn sweep(folder: &Path) {
         let age = entry.metadata().ok().and_then(|metadata| metadata.modified().ok()?.elapsed().ok());
         let is_old = age.is_some_and(|age| age > ABANDONED_AFTER);
         // Where no locks are, only the age tells.
-        if !is_old && !(cfg!(unix) && name.starts_with(&own)) {
+        if !(is_old || cfg!(unix) && name.starts_with(&own)) {
             continue;
         }
         let path = entry.path();
