@@ -116,9 +116,9 @@ fn what_a_file_has_lost_is_told() {
         let whole = folder.read(name);
         write(folder.path(&half), &whole[..whole.len() / 2]).expect("written");
         for command in [&["convert"][..], &["normals"], &["convert", "--memory", "300K"]] {
-            folder.fail(&[command, &[&half, "out.ply"]].concat(), 3, &["is cut off", "--salvage"]);
+            folder.fail(&[command, &[&half, "none.ply"]].concat(), 3, &["is cut off", "--salvage"]);
         }
-        folder.fail(&["convert", &half, "out.copc.laz"], 3, &["is cut off", "--salvage"]);
+        folder.fail(&["convert", &half, "none.copc.laz"], 3, &["is cut off", "--salvage"]);
         for output in ["out.ply", "out.copc.laz"] {
             let kept = folder.succeed(&["convert", &half, output, "--salvage", "--force", "--quiet"]);
             assert!(kept.stderr.starts_with("warning: ") && kept.stderr.contains("are lost"), "{}", kept.stderr);
@@ -138,7 +138,7 @@ fn limits_of_memory() {
         &["convert", "a.las", "out.ply", "--force"],
         &["normals", "a.ply", "out.ply", "--force"],
         &["render", "a.ply", "-o", "a.png", "--size", "1920x1080"],
-        &["render", "scene:cathedral:30M", "-o", "a.png", "--size", "40x30"],
+        &["render", "scene:cathedral:400M", "-o", "a.png", "--size", "40x30"],
         &["convert", "scene:figure:300K", "out.laz", "--force"],
     ];
     for (job, arguments) in jobs.iter().enumerate() {
@@ -146,7 +146,7 @@ fn limits_of_memory() {
             let limit = format!("-v {kibibytes}");
             let ended = at_once(&mut limited(&folder, &limit, arguments));
             expect(&ended, &[0, 6], &format!("{limit}: {arguments:?}"));
-            assert!(job != 4 || kibibytes != "400000" || ended.code == 6, "450 MB of points: {ended:?}");
+            assert!(job != 4 || ended.code == 6, "6 GB of points: {ended:?}");
         }
     }
     assert!(folder.list().iter().all(|name| !name.starts_with('.')), "nothing is left: {:?}", folder.list());

@@ -350,9 +350,9 @@ mod tests {
 
     #[test]
     fn piles_of_equal_points_are_measured_as_other_points_are() {
-        // Piles of up to 40 points on a line, so that neighbours lie in several piles.
-        let points: Vec<[f32; 3]> =
-            (0..300_u16).flat_map(|i| vec![[f32::from(i * i % 97), 0.0, -0.0]; 1 + usize::from(i % 40) / 3]).collect();
+        // Piles of up to 14 points on a line, so that neighbours lie in several piles.
+        let pile = |i: usize| vec![[(i * i % 97) as f32, 0.0, -0.0]; 1 + i % 40 / 3];
+        let points: Vec<[f32; 3]> = (0..300).flat_map(pile).collect();
         let cloud = PointCloud::new(DVec3::ZERO, points.clone());
         assert_eq!(measure(&cloud, PILED), measure(&cloud, 0), "either way");
         let places = Places::of(&points, true).expect("a tree");
