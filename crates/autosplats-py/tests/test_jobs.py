@@ -309,6 +309,10 @@ def test_a_header_that_states_less_is_noted(cloud, tmp_path):
     report = jobs.tile_normals(tiles, tmp_path / "out").run()
     (row,) = (row for row in report.rows if row.task == "t11.laz")
     assert any("outside of the header's bounds" in note for note in row.notes)
+    report = jobs.copc_tiles(tiles, tmp_path / "copc", side=5.0).run()
+    errors = {row.task: row.error for row in report.failed}
+    assert "points lie outside of the header's bounds" in errors["parts of t11"], "no point is lost without a word"
+    assert all("t11.laz: its points are missing" in error for task, error in errors.items() if task != "parts of t11")
 
 
 def test_flaky_shares_are_tried_again(tiles, alone, tmp_path):
@@ -361,6 +365,18 @@ def test_a_full_disk_leaves_whole_outputs(tiles, alone, tmp_path):
     assert 0 < len(sums) < 9
     assert all(whole[os.path.basename(name)] == found for name, found in sums.items())
     assert [line for line in lines if not line.endswith(".laz")] == [f"{tmp_path}/out", f"{tmp_path}/out/job.jsonl"]
+
+
+def test_cells_of_a_malformed_tile(cloud, tmp_path):
+    tiles = in_tiles(cloud, tmp_path / "tiles")
+    cells = np.floor(autosplats.read(tiles / "t22.laz").xyz[:, :2] / 60).astype(int)
+    lost = {f"{x}_{y}.copc.laz" for x, y in np.unique(cells, axis=0)}
+    (tiles / "none.laz").write_bytes(b"no points")
+    (tiles / "t22.laz").write_bytes((tiles / "t22.laz").read_bytes()[:3000])
+    report = jobs.copc_tiles(tiles, tmp_path / "out", side=60.0).run(retries=0)
+    failed = {row.task for row in report.failed}
+    assert lost | {"parts of none", "parts of t22"} <= failed, "no cell lacks points without a word"
+    assert contents(tmp_path / "out") and not failed & set(contents(tmp_path / "out"))
 
 
 def test_bad_arguments(tiles, tmp_path):

@@ -159,21 +159,18 @@ def copc_tiles(
     folder = Path(os.path.abspath(output))
     manifest = folder / "job.jsonl"
     work = str(work_of(manifest))
-    splits = [
-        SplitTask(f"parts of {tile.name}", tile.points, digest([tile.path, tile.stamp]), work, tile.path, keep, side)
-        for tile in found
-    ]
+    splits = []
     cells: dict[tuple[int, int], list[int]] = {}
     for number, tile in enumerate(found):
-        if tile.low is None or tile.high is None:
-            continue
-        (x0, y0), (x1, y1) = (np.floor(np.array(end[:2]) / side).astype(int).tolist() for end in (tile.low, tile.high))
-        for x in range(x0, x1 + 1):
-            for y in range(y0, y1 + 1):
+        span = _cells(tile, side)
+        inputs = digest([tile.path, tile.stamp])
+        splits.append(SplitTask(f"parts of {tile.name}", tile.points, inputs, work, tile.path, keep, side, span))
+        for x in range(span[0], span[2] + 1):
+            for y in range(span[1], span[3] + 1):
                 cells.setdefault((x, y), []).append(number)
     joins = []
     for (x, y), numbers in sorted(cells.items()):
-        share = sum(found[number].points // max(_cells_of(found[number], side), 1) for number in numbers)
+        share = sum(found[number].points // _count(splits[number].span) for number in numbers)
         inputs = digest([[found[number].path, found[number].stamp] for number in numbers])
         name = f"{x}_{y}.copc.laz"
         parts = tuple((found[number].path, splits[number].outputs()[0]) for number in numbers)
@@ -183,10 +180,17 @@ def copc_tiles(
     return Job("copc", {"side": float(side), "keep": keep}, manifest, [splits, [*joins, *faulty]])
 
 
-def _cells_of(tile: Tile, side: float) -> int:
+def _cells(tile: Tile, side: float) -> tuple[int, int, int, int]:
+    """The first and the last cell along x and y that a tile meets; none without a header."""
     if tile.low is None or tile.high is None:
-        return 0
-    return int(np.prod([np.floor(tile.high[axis] / side) - np.floor(tile.low[axis] / side) + 1 for axis in (0, 1)]))
+        return 0, 0, -1, -1
+    x0, y0, x1, y1 = np.floor(np.array([*tile.low[:2], *tile.high[:2]]) / side).astype(int).tolist()
+    return x0, y0, x1, y1
+
+
+def _count(span: tuple[int, int, int, int]) -> int:
+    """Number of cells."""
+    return (span[2] - span[0] + 1) * (span[3] - span[1] + 1)
 
 
 def _tile_job(

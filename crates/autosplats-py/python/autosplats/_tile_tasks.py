@@ -15,7 +15,7 @@ from . import _core
 from ._around import Around, Balls, Index, Mask
 from ._camera import Vector
 from ._cloud import Cloud
-from ._errors import Error
+from ._errors import Error, FormatError
 from ._files import write
 from ._normals import Normals
 from ._task import Task, unfinished, unseen
@@ -169,6 +169,8 @@ class SplitTask(Task):
     path: str
     keep: str | None
     side: float
+    #: The first and the last cell along x and y, by the file's header.
+    span: tuple[int, int, int, int]
 
     def outputs(self) -> Sequence[str]:
         return [parts_path(self.work, self.inputs)]
@@ -179,8 +181,11 @@ class SplitTask(Task):
         xyz = cloud.xyz
         cells = np.floor(xyz[:, :2] / self.side)
         inside = np.isfinite(cells).all(axis=1)
+        found = cells[inside]
+        if len(found) and ((found < self.span[:2]) | (found > self.span[2:])).any():
+            raise FormatError(f"{self.path}: points lie outside of the header's bounds; write the file anew")
         parts: dict[str, str] = {}
-        for cell in np.unique(cells[inside], axis=0):
+        for cell in np.unique(found, axis=0):
             x, y = cell.astype(int).tolist()
             path = os.path.join(self.work, f"part-{self.inputs}-{x}-{y}.las")
             with unfinished(path, self.work) as place:
