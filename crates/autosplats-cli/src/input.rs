@@ -126,9 +126,9 @@ impl Inputs {
         part: &PartArgs,
     ) -> Result<(Self, PathBuf), Failure> {
         match (paths, output) {
-            (inputs, Some(output)) => Ok((Self::parse(inputs, args)?.to_write(part), output.into())),
+            (inputs, Some(output)) => Ok((Self::parse(inputs, args)?.for_writing(part), output.into())),
             ([inputs @ .., output], None) if !inputs.is_empty() => {
-                Ok((Self::parse(inputs, args)?.to_write(part), output.into()))
+                Ok((Self::parse(inputs, args)?.for_writing(part), output.into()))
             }
             _ => Err(Failure::usage(format!("{}: the name of the file to write is missing", paths.join(" ")))),
         }
@@ -148,7 +148,7 @@ impl Inputs {
     }
 
     /// Reads all digits, for writing the points again, and only whole inputs, unless the user takes what is left.
-    fn to_write(mut self, part: &PartArgs) -> Self {
+    fn for_writing(mut self, part: &PartArgs) -> Self {
         for input in &mut self.list {
             (input.options.exact, input.options.whole) = (true, !part.salvage);
         }
