@@ -20,7 +20,7 @@ impl App {
 
     /// Performs an action.
     fn perform(&mut self, action: Action, context: &egui::Context) {
-        let Self { session, view, ui } = self;
+        let Self { session, view, ui, .. } = self;
         match action {
             Action::Run(command) => self.run(command, context),
             Action::Open(input) => session.open(input),
@@ -87,7 +87,7 @@ impl App {
 
     /// Runs a command.
     pub(crate) fn run(&mut self, command: Command, context: &egui::Context) {
-        let Self { session, view, ui } = self;
+        let Self { session, view, ui, .. } = self;
         match command {
             Command::Open => ui.panels.dialogs.open(context),
             Command::Export => ui.panels.export.open(),

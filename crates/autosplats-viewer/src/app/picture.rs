@@ -10,7 +10,7 @@ use crate::view::{legend, overlay};
 impl App {
     /// Shows the picture and handles the mouse.
     pub(super) fn picture(&mut self, ui: &mut egui::Ui) {
-        let Self { session, view, ui: Ui { tools, pointer, messages, .. } } = self;
+        let Self { session, view, ui: Ui { tools, pointer, messages, .. }, .. } = self;
         let mut actions = Vec::new();
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
             let (response, size) = view.place(ui);
