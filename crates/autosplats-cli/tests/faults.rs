@@ -11,7 +11,7 @@ mod common;
 
 use std::fs;
 use std::os::unix::process::ExitStatusExt as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -77,7 +77,7 @@ fn leftovers(folder: &Folder) -> Vec<String> {
 }
 
 /// Waits until a file exists.
-fn wait_for(path: &PathBuf) {
+fn wait_for(path: &Path) {
     let begun = Instant::now();
     while !path.exists() {
         assert!(begun.elapsed() < Duration::from_secs(30), "{} does not come", path.display());
