@@ -1,7 +1,7 @@
 //! The native half of the Python package `autosplats`: arrays to clouds, pictures to arrays, and a process that stays
 //! its owner's. The package's Python files check and describe what callers give; this library is private to them.
 //!
-//! All long work leaves the interpreter: [`wait::run`] computes in threads of [`pool`] while the caller waits for
+//! All long work leaves the interpreter: `wait::run` computes in threads of `pool` while the caller waits for
 //! signals. Clouds and pictures are immutable; arrays show their memory without a copy.
 
 #![warn(clippy::print_stderr, clippy::print_stdout, reason = "they panic where the stream cannot be written")]
