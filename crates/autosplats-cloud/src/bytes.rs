@@ -125,7 +125,7 @@ impl Deref for Bytes {
 /// Reads a small file whole, such as a pose or a camera.
 ///
 /// # Errors
-/// Those of the operating system; of the kind `FileTooLarge` if there are more than `most` bytes, and `InvalidInput` for
+/// Those of the operating system; of the kind `FileTooLarge` if there are more than `most` bytes, `InvalidInput` for
 /// a device.
 pub fn read_small(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
     let file = File::open(path)?;

@@ -4,7 +4,7 @@
 //!
 //! If a file is cut short while it is mapped, or its disk fails, reading the missing bytes raises SIGBUS, which ends
 //! the process. A handler of that signal looks for the address in a table of all maps. It puts zeros in the place of
-//! the map from there on, and marks the map as cut. The reader goes on with zeros, and its result is refused afterwards.
+//! the map from there on, and marks the map as cut. The reader goes on with zeros, and its result is refused then.
 //! Signals of other addresses go to the handler that was there before. Reading instead of mapping would cost memory and
 //! time; see docs/decisions/0051-inputs-that-fail.md.
 //!

@@ -64,7 +64,7 @@ pub struct Tile {
 /// assert_eq!(tiles.len(), 4);
 /// let tile = tiles.load(1, 2.0, usize::MAX)?.expect("it fits");
 /// assert_eq!(tile.points.iter().filter(|point| point.is_own).count(), 250);
-/// assert_eq!(tile.points.len(), 254, "two more on either side");
+/// assert_eq!(tile.points.len(), 255, "two below its box, and three from its end on");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Tiles {

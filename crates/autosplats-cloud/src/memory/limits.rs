@@ -92,7 +92,7 @@ impl<'a> Mount<'a> {
     }
 }
 
-/// Bytes of address space that a limit of this process leaves (`ulimit -v`), as `/proc` below `root` tells what is taken.
+/// Bytes of address space that a limit of this process leaves (`ulimit -v`). `/proc` below `root` tells what is taken.
 #[cfg(unix)]
 pub(super) fn address_space(root: &Path) -> Option<u64> {
     let limit = rustix::process::getrlimit(rustix::process::Resource::As).current?;

@@ -33,8 +33,8 @@ pub struct ReadOptions {
     /// formats if the file calls its classes `Classification`. Any other filter fails if the file lacks a field that
     /// the filter needs. Previews are filtered too; triangles with a corner that is left out go.
     pub keep: Option<PointFilter>,
-    /// Take only whole files: one that is cut off or damaged is an error. By default what is left of it is read, and the
-    /// [loss](autosplats_cloud::Progress::loss) is told.
+    /// Take only whole files: one that is cut off or damaged is an error. By default what is left of it is read, and
+    /// the [loss](autosplats_cloud::Progress::loss) is told.
     pub whole: bool,
     /// Headers to send with requests to an address, as `NAME: VALUE`. Files ignore them.
     pub headers: Vec<String>,

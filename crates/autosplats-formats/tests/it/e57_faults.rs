@@ -1,6 +1,9 @@
 //! Tests of E57 files that are not quite right: XML, scans and poses with faults, and ends that are missing.
 
-use std::path::Path;
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use autosplats_cloud::{
     Error, PointCloud,
@@ -10,7 +13,7 @@ use autosplats_formats::{ReadOptions, describe_bytes, read_bytes};
 
 use crate::{
     common::{field_file, las_files::Notes},
-    e57::{checksum, file, message, posed, written},
+    e57::{checksum, exact, file, message, posed, written},
 };
 
 fn load(bytes: &[u8]) -> Result<(PointCloud, String), Error> {
@@ -187,4 +190,53 @@ fn ends_that_are_missing() {
     }
     assert!(message(&bytes[..xml]).contains("cut off"), "no XML section");
     assert!(message(&bytes[..1020]).contains("cut off"), "nothing but the first points");
+}
+
+#[test]
+fn constants_and_overlaps_take_no_memory() {
+    let constant = "type=\"Integer\" minimum=\"1\" maximum=\"1\"";
+    let axes = |kind: &str| ["X", "Y", "Z"].map(|axis| format!("<cartesian{axis} {kind}/>")).concat();
+    let scan = |count: &str, values: &str| {
+        format!(
+            "<vectorChild type=\"Structure\"><points type=\"CompressedVector\" fileOffset=\"48\" \
+             recordCount=\"{count}\"><prototype type=\"Structure\">{values}</prototype></points></vectorChild>"
+        )
+    };
+    let root = |scans: &str| format!("<e57Root><data3D type=\"Vector\">{scans}</data3D></e57Root>");
+    let mut data = vec![0; 32];
+    data[0] = 1;
+    data[8..16].copy_from_slice(&(32_u64 + 512).to_le_bytes());
+    data[16..24].copy_from_slice(&80_u64.to_le_bytes());
+    // A packet of four streams, the last with 480 bytes.
+    data.extend([1, 0, 0xff, 1, 4, 0, 0, 0, 0, 0, 0, 0, 0xe0, 1]);
+    data.resize(32 + 512, 0x55);
+    for count in ["350000000000", "18446744073709551615"] {
+        for flag in [constant, "type=\"Integer\" minimum=\"0\" maximum=\"1\""] {
+            let bytes = file(&data, &root(&scan(count, &format!("{}<flag {flag}/>", axes(constant)))));
+            let message = message(&bytes);
+            let told = format!("byte 48: scan 1: {count} points in 512 bytes, less than a byte each");
+            assert!(message.contains(&told), "{flag}: {message}");
+        }
+    }
+    let eight = "<flag type=\"Integer\" minimum=\"0\" maximum=\"255\"/>";
+    let one = scan("480", &(axes(constant) + eight));
+    let cloud = read_bytes(Path::new("a.e57"), &file(&data, &root(&one)), &exact(), &()).unwrap();
+    assert_eq!((cloud.len(), cloud.positions()[479]), (480, [1.0; 3]), "constants are values");
+    let bytes = file(&data, &root(&one.repeat(20_000)));
+    let start = Instant::now();
+    let notes = Notes::default();
+    let cloud = read_bytes(Path::new("a.e57"), &bytes, &exact(), &notes).unwrap();
+    assert!(cloud.len() <= bytes.len(), "{} points of {} bytes", cloud.len(), bytes.len());
+    let notes = notes.notes.into_inner().unwrap().join("\n");
+    assert!(notes.contains("overlap"), "{notes}");
+    // One element per kind of attack on the XML parser.
+    let wide = format!("<e57Root {}/>", (0..100_000).map(|i| format!("a{i}=\"\" ")).collect::<String>());
+    assert!(message(&file(&[], &wide)).contains("a tag of"), "many attributes");
+    let spaces = (0..50_000).map(|i| format!("<a xmlns:p{i}=\"u{i}\">")).collect::<String>();
+    assert!(message(&file(&[], &format!("<e57Root>{spaces}"))).contains("namespaces"), "many namespaces");
+    assert!(message(&file(&[], &"<a>".repeat(300_000))).contains("XML section"), "deep nesting");
+    let laughs = "<!DOCTYPE a [<!ENTITY b \"bbbb\">]><e57Root>&b;</e57Root>";
+    assert!(message(&file(&[], laughs)).contains("XML section"), "entities");
+    // Far above what they take on a slow machine: quadratic time is what this looks for.
+    assert!(start.elapsed() < Duration::from_secs(100), "all at once: {:?}", start.elapsed());
 }
