@@ -2,9 +2,9 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
-use autosplats_cloud::Progress;
+use autosplats_cloud::{Progress, lock};
 
 /// A request to end a command. Clones are the same request.
 ///
@@ -52,7 +52,7 @@ impl Interrupt {
         if !self.0.finish_first.load(Ordering::SeqCst) || self.0.finishing.swap(true, Ordering::SeqCst) {
             return false;
         }
-        if let Some(sender) = self.0.to_wake.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        if let Some(sender) = lock(&self.0.to_wake).take() {
             // The work may have ended.
             let _ = sender.send(());
         }
@@ -73,7 +73,7 @@ impl Interrupt {
     pub(crate) fn clear(&self) {
         let State { end_now, finish_first, finishing, is_told, to_wake } = &*self.0;
         [end_now, finish_first, finishing, is_told].into_iter().for_each(|flag| flag.store(false, Ordering::SeqCst));
-        *to_wake.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        *lock(to_wake) = None;
     }
 
     /// Makes the next request only ask the work to [finish](Self::ending).
@@ -84,7 +84,7 @@ impl Interrupt {
     /// Like [`end_gently`](Self::end_gently), of work that waits for a message.
     #[cfg(feature = "viewer")]
     pub(crate) fn end_gently_by(&self, sender: Sender<()>) {
-        *self.0.to_wake.lock().unwrap_or_else(PoisonError::into_inner) = Some(sender);
+        *lock(&self.0.to_wake) = Some(sender);
         self.end_gently();
     }
 

@@ -91,6 +91,10 @@ fn leave_nothing(console: &Console, exit: Option<Exit>) {
     if std::thread::Builder::new().spawn(work).is_ok() {
         // It ends as the sender is dropped.
         let _ = ended.recv_timeout(END_WITHIN);
+    } else {
+        // Without another thread nothing is printed, which might block.
+        abandon_films();
+        abandon_drafts();
     }
 }
 

@@ -1,4 +1,4 @@
-//! Inputs that fail, lie or change while they are read, and limits of the system: each run ends in time, by no signal,
+//! Inputs that fail, lie or change while they are read, and limits of the system. Each run ends in time, by no signal,
 //! with the right exit code and at most one line of error.
 
 #![cfg(target_os = "linux")]

@@ -8,7 +8,7 @@ use std::{
     time::SystemTime,
 };
 
-use crate::{Error, check_memory, maps::Map};
+use crate::{Error, check_memory, maps::Map, reserving};
 
 /// The content of a file: mapped, or read if the file cannot be mapped, such as a pipe.
 ///
@@ -175,7 +175,8 @@ fn read_pipe(path: &Path, file: &mut File) -> Result<Vec<u8>, Error> {
             let more = bytes.len().max(STEP);
             let what = || format!("what comes through {}", path.display());
             check_memory(&what(), (bytes.len() + more) as u64)?;
-            bytes.try_reserve(more).map_err(|_| Error::OutOfMemory { what: what(), bytes: more })?;
+            let room = reserving(|| bytes.try_reserve(more));
+            room.map_err(|_| Error::OutOfMemory { what: what(), bytes: more })?;
         }
         let read = file.by_ref().take(STEP as u64).read_to_end(&mut bytes);
         if read.map_err(|source| Error::Io { path: path.into(), source })? == 0 {

@@ -70,7 +70,7 @@ pub use glam;
 pub use guard::guard;
 pub use memory::{available_memory, check_memory, own_memory, total_memory, usual_memory};
 pub use merge::normal_matrix;
-pub use output::{Draft, Existing, Output, abandon_drafts, write_whole};
+pub use output::{Draft, Existing, Output, abandon_drafts, is_there, write_whole};
 pub use pool::{PointPool, PointRun, SLOT_POINTS, SLOT_SHIFT};
 pub use precision::{
     RelativeValues, ValueOrigin, degree_origin, residual, sample_step, sampled_bounds, sampled_middle, storage_origin,

@@ -90,16 +90,15 @@ impl Progress for () {
 }
 
 /// Tells what an input has lost, because it is cut off or damaged: as a [loss](Progress::loss), or as an error if only
-/// whole inputs are taken. `loss` names what is lost, without a remedy.
+/// whole inputs are taken.
 ///
 /// # Errors
 /// [`Error::Malformed`] at `place`, if `whole`.
 pub fn tell_loss(path: &Path, place: &str, loss: &str, whole: bool, progress: &dyn Progress) -> Result<(), Error> {
     if whole {
-        let what = format!("{loss}; copy it again, or take what is left with --salvage");
-        return Err(Error::malformed(path, place, what));
+        return Err(Error::malformed(path, place, format!("{loss}; --salvage takes what is left")));
     }
-    progress.loss(&one_line(&format!("{loss}; copy it again")));
+    progress.loss(&one_line(loss));
     Ok(())
 }
 

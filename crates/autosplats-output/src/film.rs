@@ -4,12 +4,12 @@ use std::ffi::OsString;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use autosplats::Image;
-use autosplats::cloud::{Draft, Output};
+use autosplats::cloud::{Draft, Output, lock};
 
 use crate::Error;
 
@@ -174,7 +174,7 @@ impl Running {
         // Ctrl-C must only reach this process, which then removes the unfinished file.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        let mut running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut running = lock(&RUNNING);
         if running.1 {
             return Err(std::io::Error::other("the program ends"));
         }
@@ -198,7 +198,7 @@ impl Running {
 
     /// The number may be another program's from now on.
     fn forget(&self) {
-        RUNNING.lock().unwrap_or_else(PoisonError::into_inner).0.retain(|&number| number != self.child.id());
+        lock(&RUNNING).0.retain(|&number| number != self.child.id());
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use autosplats::cloud::is_there;
+
 use crate::{Error, PictureFormat};
 
 /// Most digits of a number in a name.
@@ -137,11 +139,6 @@ impl Target {
             Self::Frames(frames) => (0..pictures).map(|number| frames.file(number)).find(|path| is_there(path)),
         }
     }
-}
-
-/// Whether something is at a path, which may be a link to nothing.
-fn is_there(path: &Path) -> bool {
-    path.symlink_metadata().is_ok()
 }
 
 impl Frames {

@@ -23,6 +23,7 @@ pub(crate) struct Reading {
     keep: Option<String>,
     keep_no_returns: bool,
     headers: Vec<String>,
+    whole: bool,
     bounds: Option<[[f64; 3]; 2]>,
 }
 
@@ -34,10 +35,10 @@ impl Reading {
 
     /// The options for the libraries.
     pub(crate) fn options(self) -> PyResult<ReadOptions> {
-        let Self { exact, columns, keep, keep_no_returns, headers, bounds: _ } = self;
+        let Self { exact, columns, keep, keep_no_returns, headers, whole, bounds: _ } = self;
         let keep = keep.map(|words| words.parse::<PointFilter>()).transpose();
         let keep = keep.map_err(|error| Failure::Cloud(error).raise())?;
-        Ok(ReadOptions { exact, columns, keep, keep_no_returns, headers, ..ReadOptions::default() })
+        Ok(ReadOptions { exact, columns, keep, keep_no_returns, headers, whole, ..ReadOptions::default() })
     }
 }
 

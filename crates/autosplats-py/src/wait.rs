@@ -7,7 +7,7 @@ use std::sync::{Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use autosplats_cloud::Progress;
+use autosplats_cloud::{Progress, lock};
 use pyo3::prelude::*;
 
 use crate::errors::{self, Class, Failure};
@@ -22,7 +22,8 @@ pub(crate) struct Watch {
     cancelled: AtomicBool,
     /// Bits of the finished fraction.
     fraction: AtomicU32,
-    notes: Mutex<Vec<String>>,
+    /// Notes, and whether they are of losses.
+    notes: Mutex<Vec<(String, bool)>>,
     ended: Mutex<bool>,
     end: Condvar,
 }
@@ -38,7 +39,11 @@ impl Progress for Watch {
     }
 
     fn note(&self, note: &str) {
-        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.to_owned());
+        lock(&self.notes).push((note.to_owned(), false));
+    }
+
+    fn loss(&self, loss: &str) {
+        lock(&self.notes).push((loss.to_owned(), true));
     }
 }
 
@@ -134,12 +139,15 @@ fn tell(watch: &Watch, progress: Option<&Bound<'_, PyAny>>, told: &mut f32) -> P
 }
 
 fn log(py: Python<'_>, watch: &Watch) -> PyResult<()> {
-    let notes = std::mem::take(&mut *watch.notes.lock().unwrap_or_else(PoisonError::into_inner));
+    let notes = std::mem::take(&mut *lock(&watch.notes));
     if notes.is_empty() {
         return Ok(());
     }
     let logger = py.import("logging")?.call_method1("getLogger", ("autosplats",))?;
-    notes.into_iter().try_for_each(|note| logger.call_method1("info", ("%s", note)).map(drop))
+    notes.into_iter().try_for_each(|(note, is_loss)| {
+        let level = if is_loss { "warning" } else { "info" };
+        logger.call_method1(level, ("%s", note)).map(drop)
+    })
 }
 
 /// What a panic said.

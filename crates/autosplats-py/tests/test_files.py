@@ -140,3 +140,14 @@ def test_bounds_of_files_and_octrees(tmp_path):
     for bounds in ([0, 1], [[1, 1, 1], [0, 2, 2]], [[np.nan, 0, 0], [1, 1, 1]]):
         with pytest.raises(autosplats.ArgumentError, match="bounds"):
             autosplats.read(tmp_path / "a.laz", bounds=bounds)
+
+
+def test_what_a_file_has_lost_is_told(tmp_path, caplog):
+    path = tmp_path / "half.las"
+    autosplats.write(autosplats.Cloud(np.random.default_rng(1).random((1000, 3))), path)
+    path.write_bytes(path.read_bytes()[:-10_000])
+    with caplog.at_level("WARNING", logger="autosplats"):
+        left = len(autosplats.read(path))
+    assert left < 1000 and any(f"{1000 - left} of 1000 points are lost" in record.message for record in caplog.records)
+    with pytest.raises(autosplats.FormatError, match="are lost"):
+        autosplats.read(path, whole=True)

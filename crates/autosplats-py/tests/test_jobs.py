@@ -293,6 +293,16 @@ def test_a_malformed_tile_fails_alone(cloud, truth, tmp_path):
     are_exact(tmp_path / "out", cloud, truth)
 
 
+def test_a_tile_that_is_cut_off_is_no_whole_tile(cloud, tmp_path):
+    tiles = tmp_path / "tiles"
+    tiles.mkdir()
+    autosplats.write(cloud, tiles / "half.las")
+    (tiles / "half.las").write_bytes((tiles / "half.las").read_bytes()[:-100_000])
+    report = jobs.tile_normals(tiles, tmp_path / "out").run()
+    assert [row.task for row in report.failed] == ["half.laz"] and "points are lost" in report.failed[0].error
+    assert not contents(tmp_path / "out")
+
+
 def test_borders_that_a_machine_does_not_see(tiles, alone, tmp_path):
     job = jobs.tile_normals(tiles, tmp_path / "out")
     job.steps = [[], job.tasks]

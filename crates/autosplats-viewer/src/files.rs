@@ -60,11 +60,6 @@ pub(crate) fn write<'a>(
     write_whole(output, |error| error, |file| content(file)).map(|_bytes| ())
 }
 
-/// Whether something is at a path, which may be a link to nothing.
-pub(crate) fn is_there(path: &Path) -> bool {
-    path.symlink_metadata().is_ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

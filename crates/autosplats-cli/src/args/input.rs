@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use autosplats::Detail;
 use autosplats_cloud::PointFilter;
 use autosplats_formats::DepthCamera;
 use clap::Args;
@@ -111,6 +112,6 @@ impl TreeArgs {
     }
 
     pub(crate) fn max_points(&self) -> usize {
-        self.points_budget.unwrap_or(10_000_000)
+        self.points_budget.unwrap_or(Detail::default().max_points)
     }
 }

@@ -145,31 +145,29 @@ fn write_film(
     let interrupt = style.console.interrupt();
     let failure = |error| Failure::new(Exit::Output, error);
     let mut reports = Vec::new();
-    {
-        let mut film = Film::begin(path, style.size, style.rate).map_err(failure)?;
-        let mut complete = false;
-        for shot in shots {
-            let Some(QueuedPicture { image, report }) = shot else {
-                complete = true;
-                break;
-            };
-            for _ in 0..report.pictures.unwrap_or(1) {
-                film.add(&image).map_err(failure)?;
-            }
-            if style.json {
-                reports.push(report);
-            }
-            let _ = written.send(image);
+    let mut film = Film::begin(path, style.size, style.rate).map_err(failure)?;
+    let mut complete = false;
+    for shot in shots {
+        let Some(QueuedPicture { image, report }) = shot else {
+            complete = true;
+            break;
+        };
+        for _ in 0..report.pictures.unwrap_or(1) {
+            film.add(&image).map_err(failure)?;
         }
-        if interrupt.requested() {
-            return Err(Failure::interrupted());
+        if style.json {
+            reports.push(report);
         }
-        if !complete {
-            // The sender reports why pictures are missing.
-            return Ok(());
-        }
-        film.finish().map_err(failure)?;
+        let _ = written.send(image);
     }
+    if interrupt.requested() {
+        return Err(Failure::interrupted());
+    }
+    if !complete {
+        // The sender reports why pictures are missing.
+        return Ok(());
+    }
+    film.finish().map_err(failure)?;
     // The film exists only now, so its frames are reported only now.
     reports.iter().try_for_each(|report| style.console.print_json(report))
 }

@@ -50,7 +50,7 @@ pub fn own_memory() -> Option<[u64; 2]> {
 const USUAL: [u64; 2] = [256 << 20, 2 << 30];
 
 /// Memory in bytes for work of any size that may choose how much it takes: a quarter of what is available, from 256 MiB
-/// to 2 GiB; but no more than half of what is available.
+/// to 2 GiB. It is never more than half of what is available.
 pub fn usual_memory() -> u64 {
     let available = available_memory().unwrap_or(4 * USUAL[1]);
     (available / 4).clamp(USUAL[0], USUAL[1]).min(available / 2)

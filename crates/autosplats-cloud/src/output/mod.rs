@@ -192,6 +192,11 @@ pub fn write_whole<'a, E>(
     draft.finish().map_err(failed)
 }
 
+/// Whether something is at a path, which may be a link to nothing.
+pub fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}
+
 /// Folder of a file.
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
@@ -222,7 +227,7 @@ fn target(Output { path, existing }: Output<'_>) -> Result<(Target, Option<Metad
     }
     let path = if followed.is_some() { path.canonicalize()? } else { end_of_links(path)? };
     let replaced = check_file(&path)?;
-    if replaced.is_some() && !is_writable(&path, replaced.as_ref()) {
+    if replaced.as_ref().is_some_and(|file| !is_writable(&path, file)) {
         return Err(Error::new(ErrorKind::PermissionDenied, "it is read-only; make it writable or name another file"));
     }
     Ok((Target::File { path, existing }, replaced))
@@ -274,9 +279,9 @@ fn is_stream(metadata: &Metadata) -> bool {
 }
 
 /// Whether somebody may write to a file, and this process too.
-fn is_writable(path: &Path, file: Option<&Metadata>) -> bool {
+fn is_writable(path: &Path, file: &Metadata) -> bool {
     // The superuser may write to every file: a file that nobody else may write to is protected nevertheless.
-    if file.is_some_and(|file| file.permissions().readonly()) {
+    if file.permissions().readonly() {
         return false;
     }
     #[cfg(unix)]

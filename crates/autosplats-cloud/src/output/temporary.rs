@@ -13,11 +13,13 @@ use std::{
     fs::File,
     io::{Error, Result},
     path::{Path, PathBuf},
-    sync::{Mutex, OnceLock, PoisonError},
+    sync::{Mutex, OnceLock},
     time::{Duration, Instant},
 };
 
 use tempfile::{NamedTempFile, TempPath};
+
+use crate::lock;
 
 /// What the names of all temporary files begin with.
 pub(super) const PREFIX: &str = ".autosplats-";
@@ -77,7 +79,7 @@ impl Temporary {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         for _ in 0..MAX_TRIES {
-            let mut drafts = DRAFTS.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut drafts = lock(&DRAFTS);
             if drafts.ended {
                 return Err(Error::other("the program ends"));
             }
@@ -120,7 +122,7 @@ impl Drop for Temporary {
     fn drop(&mut self) {
         let path = self.file.path();
         let _ = std::fs::remove_file(path);
-        let mut drafts = DRAFTS.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut drafts = lock(&DRAFTS);
         drafts.paths.retain(|listed| listed != path);
     }
 }
@@ -141,7 +143,7 @@ pub(super) fn computer() -> u32 {
 /// Removes what ended processes have left in a folder, once in the life of this process.
 pub(super) fn sweep_once(folder: &Path) {
     static SWEPT: Mutex<Option<HashSet<PathBuf>>> = Mutex::new(None);
-    let mut swept = SWEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut swept = lock(&SWEPT);
     if swept.get_or_insert_default().insert(folder.to_owned()) {
         drop(swept);
         sweep(folder);

@@ -58,12 +58,12 @@ impl Job<'_> {
         if held < claimed {
             let lost = claimed - held;
             let end = format!("byte {}", self.bytes.len());
-            self.loss(&end, format!("the file is cut off: {lost} of {claimed} {what} are lost"))?;
+            self.loss(&end, format!("the file is cut off: {lost} of {claimed} {what} are lost; copy it again"))?;
         }
         Ok(())
     }
 
-    /// Tells what is lost of a file that is cut off or damaged, without a remedy.
+    /// Tells what is lost of a file that is cut off or damaged.
     ///
     /// # Errors
     /// [`Error::Malformed`] if the options take only whole files.

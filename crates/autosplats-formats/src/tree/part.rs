@@ -70,7 +70,7 @@ pub fn read_part(tree: &dyn Tree, part: &Part, wanted: &Wanted, progress: &dyn P
             return Err(fault);
         }
         let lost = reading.lost;
-        let loss = format!("damaged nodes: {lost} of {total} points are lost");
+        let loss = format!("damaged nodes: {lost} of {total} points are lost; copy it again");
         tell_loss(tree.name(), "nodes", &loss, part.whole, progress)?;
     }
     let (read, left) = (reading.read, reading.read - cloud.len() as u64);

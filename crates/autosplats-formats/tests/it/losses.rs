@@ -61,7 +61,7 @@ fn what_is_cut_off_is_a_loss_or_an_error() {
         assert_eq!(told, [&*loss, &*loss], "{name}");
         for error in read(true, &Losses::default()).map(Result::unwrap_err) {
             let error = error.to_string();
-            let remedy = "points are lost; copy it again, or take what is left with --salvage";
+            let remedy = "points are lost; copy it again; --salvage takes what is left";
             assert!(error.contains(name) && error.ends_with(remedy), "{name}: {error}");
         }
     }

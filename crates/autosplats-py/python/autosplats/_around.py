@@ -104,7 +104,7 @@ class Index:
         tile = self.tiles[number]
         if tile.fault is not None:
             raise FormatError(tile.fault)
-        cloud = read(tile.path, keep=self.keep, bounds=bounds if tile.is_tree else None)
+        cloud = read(tile.path, keep=self.keep, whole=True, bounds=bounds if tile.is_tree else None)
         ends = cloud.bounds if tile.box is None and bounds is None else None
         if ends is not None and ((ends[0] < self.lows[number]) | (ends[1] > self.highs[number])).any():
             what = "%s: there are points outside of the header's bounds, which tiles around do not look for"

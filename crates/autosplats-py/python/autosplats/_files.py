@@ -37,6 +37,7 @@ def reading(
     keep: str | None = None,
     keep_no_returns: bool = False,
     headers: Sequence[str] = (),
+    whole: bool = False,
     bounds: npt.ArrayLike | None = None,
 ) -> dict[str, Any]:
     """Options of reading for the native half."""
@@ -48,6 +49,7 @@ def reading(
         "keep": keep,
         "keep_no_returns": keep_no_returns,
         "headers": list(headers),
+        "whole": whole,
         "bounds": None if bounds is None else _box(bounds),
     }
 
@@ -77,6 +79,7 @@ def read(
     keep_no_returns: bool = False,
     headers: Sequence[str] = (),
     exact: bool = True,
+    whole: bool = False,
     progress: ProgressLike = None,
     num_threads: int | None = None,
 ) -> Cloud:
@@ -94,10 +97,12 @@ def read(
         keep_no_returns: Keep points at (0, 0, 0), which scanners write for missing returns.
         headers: Headers of requests to an address, as "NAME: VALUE".
         exact: Keep every digit of coordinates and colours. Without it a cloud takes less memory.
+        whole: Raise FormatError if the file is cut off or damaged, where else what is left is read with a warning.
         progress: True for a bar, or a function of the finished fraction.
         num_threads: Number of threads; see `num_threads`.
 
-    Notes on what was left out or guessed go to the logger "autosplats" at level INFO.
+    Notes on what was left out or guessed go to the logger "autosplats" at level INFO, and what a file has lost at level
+    WARNING.
 
     Raises:
         FileNotFoundError, PermissionError, OSError: If the system does not give the file.
@@ -106,7 +111,13 @@ def read(
         OutOfMemoryError: If the points do not fit into memory.
     """
     options = reading(
-        exact=exact, columns=columns, keep=keep, keep_no_returns=keep_no_returns, headers=headers, bounds=bounds
+        exact=exact,
+        columns=columns,
+        keep=keep,
+        keep_no_returns=keep_no_returns,
+        headers=headers,
+        whole=whole,
+        bounds=bounds,
     )
     threads = checked(num_threads)
     with reporting(progress, "reading") as report:

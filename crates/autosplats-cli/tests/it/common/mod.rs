@@ -17,6 +17,12 @@ pub(crate) const SPHERE_POINTS: usize = 6000;
 /// Camera in front of the unit sphere.
 pub(crate) const FRONT: [&str; 8] = ["--eye", "0,-4,0", "--look-at", "0,0,0", "--up", "0,0,1", "--fov", "40"];
 
+/// Says that something is not tested on this machine. Not by `println!`, whose words a test that passes keeps.
+pub(crate) fn left_out(what: &str, why: &str) {
+    use std::io::Write as _;
+    let _ = writeln!(std::io::stderr(), "left out: {what}: {why}");
+}
+
 /// A temporary folder, initially empty, in which the command runs.
 pub(crate) struct Folder(tempfile::TempDir);
 

@@ -18,7 +18,7 @@ mod repair;
 mod source;
 mod xml;
 
-use autosplats_cloud::{Contents, Error, one_line};
+use autosplats_cloud::{Contents, Error};
 
 use std::ops::Range;
 
@@ -86,7 +86,7 @@ fn scans<'a, T>(
     root.notes.iter().for_each(|note| job.note(note));
     if pages.cut_off() {
         let end = format!("byte {}", job.bytes.len());
-        tell(job, &end, &format!("the file is cut off at {end}"), "; what is left is read")?;
+        job.loss(&end, format!("the file is cut off at {end}"))?;
     }
     let mut left = job.bytes.len();
     let mut done = 0.0;
@@ -124,25 +124,16 @@ fn scans<'a, T>(
     }
     for (loss, is_damage) in told.iter().take(MAX_NOTED_LOSSES) {
         if *is_damage {
-            tell(job, "scans", loss, "")?;
+            job.loss("scans", loss)?;
         } else {
             job.note(loss);
         }
     }
     if told.len() > MAX_NOTED_LOSSES {
-        tell(job, "scans", &format!("{} more losses in scans", told.len() - MAX_NOTED_LOSSES), "")?;
+        job.loss("scans", format!("{} more losses in scans", told.len() - MAX_NOTED_LOSSES))?;
     }
     dropped.note(job);
     Ok(found)
-}
-
-/// Tells a loss, for which copying the file again need not be the remedy. `rest` ends it where it is no error.
-fn tell(job: &Job<'_>, place: &str, loss: &str, rest: &str) -> Result<(), Error> {
-    if job.options.whole {
-        return job.loss(place, loss);
-    }
-    job.progress.loss(&one_line(&format!("{loss}{rest}")));
-    Ok(())
 }
 
 /// Descriptions of what is missing or not read of a scan, each with whether the file is damaged.

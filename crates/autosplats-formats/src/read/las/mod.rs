@@ -155,12 +155,12 @@ const CUT: &str = "end of the file";
 
 /// The loss of points that the file ends before.
 fn cut_off(lost: u64, claimed: u64) -> Option<String> {
-    (lost > 0).then(|| format!("the file is cut off: {lost} of {claimed} points are lost"))
+    (lost > 0).then(|| format!("the file is cut off: {lost} of {claimed} points are lost; copy it again"))
 }
 
 /// The loss of points that cannot be decompressed.
 pub(crate) fn damage(lost: u64, claimed: u64) -> Option<String> {
-    (lost > 0).then(|| format!("compressed data are damaged: {lost} of {claimed} points are lost"))
+    (lost > 0).then(|| format!("compressed data are damaged: {lost} of {claimed} points are lost; copy it again"))
 }
 
 /// Tells how many of the points the file ends before, and how many cannot be decompressed.

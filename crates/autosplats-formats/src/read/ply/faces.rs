@@ -65,7 +65,7 @@ impl Reader<'_> {
     fn tell_cut_off(&self, complete: usize) -> Result<(), Error> {
         let count = self.element.count;
         let (lost, end) = (count - complete, format!("byte {}", self.job.bytes.len()));
-        self.job.loss(&end, format!("the file is cut off: {lost} of {count} faces are lost"))
+        self.job.loss(&end, format!("the file is cut off: {lost} of {count} faces are lost; copy it again"))
     }
 
     fn binary(&self, start: usize, big_endian: bool, faces: &mut Faces) -> Result<(), Error> {

@@ -4,13 +4,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-use autosplats::cloud::{Existing, check_memory};
+use autosplats::cloud::{Existing, check_memory, is_there};
 use autosplats::{BYTES_PER_PIXEL, MAX_SIDE};
 use autosplats_output::PictureFormat;
 use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile, Write};
-use crate::files::is_there;
 use crate::session::Session;
 use crate::view::{Goal, Task, View};
 

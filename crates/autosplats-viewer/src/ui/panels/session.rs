@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use autosplats::cloud::is_there;
 use eframe::egui;
 
 use super::target_file::{DialogTexts, TargetFile};
-use crate::files::is_there;
 use crate::session::Session;
 use crate::view::{State, View};
 
