@@ -172,15 +172,18 @@ fn work(arguments: &Arguments, share: [u64; 2]) -> Result<()> {
         }
         formats.retain(|seeds| arguments.readers.iter().any(|reader| reader == seeds.extension));
     }
-    let mut findings = 0;
+    let (mut done, mut findings) = (0, 0);
     let count = formats.len() as u32;
     for seeds in formats {
         let limit = match arguments.inputs {
             Some(inputs) => Limit::Inputs(inputs.div_ceil(share[1])),
             None => Limit::Time(Duration::from_secs(arguments.seconds) / count),
         };
-        findings += Run::new(&seeds, arguments.seed, share)?.go(&limit)?;
+        let (inputs, found) = Run::new(&seeds, arguments.seed, share)?.go(&limit)?;
+        done += inputs;
+        findings += found;
     }
+    println!("all formats {}/{}: {done} inputs, {findings} findings", share[0] + 1, share[1]);
     if findings > 0 {
         bail!("{findings} findings");
     }
@@ -225,8 +228,8 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Tries inputs up to the limit. Returns the number of findings.
-    fn go(mut self, limit: &Limit) -> Result<usize> {
+    /// Tries inputs up to the limit. Returns their number and that of the findings.
+    fn go(mut self, limit: &Limit) -> Result<(u64, usize)> {
         let name = format!("a.{}", self.seeds.extension);
         for (index, file) in self.seeds.files.iter().enumerate().take(self.seeds.own) {
             let read = target::read(Path::new(&name), file, &ReadOptions::default(), false, &());
@@ -261,7 +264,7 @@ impl<'a> Run<'a> {
             self.most_memory as f64 / 1e6,
             self.findings
         );
-        Ok(self.findings)
+        Ok((done, self.findings))
     }
 
     fn one(&mut self, name: &Path, number: u64) -> Result<()> {

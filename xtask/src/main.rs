@@ -26,6 +26,8 @@ usage: cargo xtask test               runs every check of CI: rules, lints, docu
        cargo xtask python             builds and tests the package of Python, and checks its types
        cargo xtask wheel              builds its wheel for distribution, checks it, and installs it for every Python found
        cargo xtask fuzz [OPTIONS]     gives broken files to every reader; --help lists the options
+       cargo xtask faults [ROUNDS]    signals, races, cut files and little memory at random moments, by default 13 times,
+                                  which are more than 2,000 runs of the command in half an hour
        cargo xtask quality [OPTIONS]  measures pictures against exact surfaces, in ten minutes, prints what changed since
                                   docs/quality/measures.json, and writes that file and docs/QUALITY.md anew unless an
                                   error grew by more than 3 %; --quick and --only NAME measure some cases; see --help
@@ -57,6 +59,8 @@ fn main() -> ExitCode {
         ["python"] => root().and_then(python::alone),
         ["wheel"] => root().and_then(python::wheel),
         ["fuzz", options @ ..] => root().and_then(|root| fuzz(root, options)),
+        ["faults"] => root().and_then(|root| faults(root, "13")),
+        ["faults", rounds] => root().and_then(|root| faults(root, rounds)),
         ["quality", options @ ..] => root().and_then(|root| quality(root, options)),
         ["formats"] => root().and_then(|root| formats::write(root, &formats::build(root)?)),
         ["formats", "--program", program] => root().and_then(|root| formats::write(root, program.as_ref())),
@@ -96,6 +100,14 @@ fn root() -> Result<&'static Path> {
 /// Broken files for every reader. Built like the tests, so that overflows are found too.
 fn fuzz(root: &Path, options: &[&str]) -> Result<()> {
     cargo(root, &[&["run", "--locked", "--quiet", "-p", "autosplats-fuzz", "--"], options].concat())
+}
+
+/// The tests of faults at random moments, again and again. Built like the tests, which are there already.
+fn faults(root: &Path, rounds: &str) -> Result<()> {
+    ensure!(rounds.parse::<u32>().is_ok_and(|rounds| rounds > 0), "'{rounds}' is no number of rounds");
+    let mut command = cargo_command(root);
+    command.args(["test", "--locked", "--workspace"]).args(FEATURES).args(["--test", "faults", "--test", "limits"]);
+    run(command.args(["--no-fail-fast", "--", "--test-threads=2"]).env("AUTOSPLATS_ROUNDS", rounds))
 }
 
 /// Pictures against exact surfaces. Built for speed, as all cases are measured; the tests measure the small ones.

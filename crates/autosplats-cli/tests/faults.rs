@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use autosplats_cloud::Random;
 
-use crate::common::{FRONT, Folder};
+use crate::common::{FRONT, Folder, rounds};
 
 /// Longest time from a signal or a fault to the end of the command, on a busy machine.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
@@ -120,7 +120,7 @@ fn signals_at_random_moments_leave_whole_files_or_none() {
     let signals = [("INT", Some(130)), ("TERM", Some(143)), ("HUP", Some(129)), ("QUIT", None), ("USR1", None)];
     let mut random = Random::new(20_261_128, 0);
     let mut hit = 0;
-    for (arguments, outputs) in jobs() {
+    for (arguments, outputs) in (0..rounds()).flat_map(|_| jobs()) {
         let folder = with_points();
         // The day is part of some files.
         let command = || {
@@ -139,7 +139,7 @@ fn signals_at_random_moments_leave_whole_files_or_none() {
             send(signal, &child);
             ends_in_time(&mut child, &format!("{arguments:?} after {signal}"));
             let end = ended(child);
-            hit += u32::from(end.code != Some(0));
+            hit += u64::from(end.code != Some(0));
             let what = format!("{arguments:?} after {signal}: {end:?}");
             match (code, end.code) {
                 // It had ended.
@@ -163,7 +163,7 @@ fn signals_at_random_moments_leave_whole_files_or_none() {
         assert_eq!(leftovers(&folder), [""; 0], "{arguments:?}");
         assert_eq!(content(&folder, &outputs), whole, "{arguments:?}: the same again");
     }
-    assert!(hit > 12, "only {hit} runs were ended by their signal");
+    assert!(hit > 12 * rounds(), "only {hit} runs were ended by their signal");
 }
 
 #[test]
@@ -191,7 +191,7 @@ fn what_a_killed_run_has_left_goes_with_the_next() {
 #[test]
 fn of_runs_that_race_for_a_name_one_wins() {
     let folder = with_points();
-    for round in 0..6 {
+    for round in 0..6 * rounds() {
         let name = format!("u{round}.ply");
         let children: Vec<Child> =
             (0..6).map(|_| start(&folder, &["convert", "points.ply", &name, "--quiet"])).collect();
@@ -208,7 +208,8 @@ fn of_runs_that_race_for_a_name_one_wins() {
 #[test]
 fn files_that_come_while_a_command_works_stay() {
     let folder = with_points();
-    for (command, name) in [("convert", "late.laz"), ("normals", "late.ply")] {
+    for (command, name) in [("convert", "late.laz"), ("normals", "late.ply")].repeat(rounds() as usize) {
+        let _ = fs::remove_file(folder.path(name));
         let child = start(&folder, &[command, "scene:cathedral:1M", name]);
         // Points are read or generated, and the name was free.
         while leftovers(&folder).is_empty() {
@@ -348,7 +349,8 @@ fn a_film_ends_with_the_command_and_ffmpeg_with_it() {
         ("starts others", "echo $$ > number; sleep 100 & wait"),
         ("reads all", "echo $$ > number; for last; do :; done; cat > \"$last\"; sleep 100"),
     ];
-    for (what, script) in scripts {
+    let mut random = Random::new(20_261_129, 0);
+    for (what, script) in scripts.repeat(rounds() as usize) {
         for (signal, code) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
             let folder = Folder::new();
             let path = folder.with_ffmpeg(script);
@@ -356,7 +358,7 @@ fn a_film_ends_with_the_command_and_ffmpeg_with_it() {
             command.args(["--frames", "0..40"]).env("PATH", path);
             let mut child = spawn(command);
             wait_for(&folder.path("number"));
-            std::thread::sleep(Duration::from_millis(500));
+            std::thread::sleep(Duration::from_secs_f64(random.unit()));
             send(signal, &child);
             ends_in_time(&mut child, what);
             let end = ended(child);
@@ -399,8 +401,10 @@ fn too_little_memory_is_an_error_of_one_line() {
     // The program itself, whose size depends on how it is built.
     let least = (1..).map(|step| step * 8_000).find(starts).expect("it starts at some limit");
     let mut failed = 0;
-    for (arguments, outputs) in jobs() {
-        for kilobytes in [least, least + 4_000, least + 10_000, least + 30_000, least + 200_000] {
+    let mut random = Random::new(20_261_130, 0);
+    for (arguments, outputs) in (0..rounds()).flat_map(|_| jobs()) {
+        for most in [1, 4_000, 10_000, 30_000, 200_000] {
+            let kilobytes = least + random.modulo(most) as u32;
             outputs.iter().for_each(|name| fs::remove_file(folder.path(name)).unwrap_or_default());
             // One thread, since each has memory for its stack.
             let limited = [&arguments[..], &["--threads", "1"]].concat();

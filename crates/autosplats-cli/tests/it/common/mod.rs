@@ -23,6 +23,12 @@ pub(crate) fn left_out(what: &str, why: &str) {
     let _ = writeln!(std::io::stderr(), "left out: {what}: {why}");
 }
 
+/// Times that faults at random moments are repeated. `cargo xtask faults` asks for more.
+pub(crate) fn rounds() -> u64 {
+    let asked = std::env::var("AUTOSPLATS_ROUNDS").ok();
+    asked.map_or(1, |text| text.parse().expect("AUTOSPLATS_ROUNDS is a number"))
+}
+
 /// A temporary folder, initially empty, in which the command runs.
 pub(crate) struct Folder(tempfile::TempDir);
 
