@@ -23,7 +23,7 @@ use crate::args::{InputArgs, PartArgs, PlayingArgs, ReadingArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::output::{ReadFiles, folder_of};
-use crate::progress::{Bar, InputProgress};
+use crate::progress::Bar;
 
 /// Most fields and inputs that a message names.
 const MAX_LISTED_NAMES: usize = 10;
@@ -319,7 +319,8 @@ impl Inputs {
         }
         let filled = clouds.into_iter().zip(parts).filter_map(|(cloud, part)| Some((cloud?, part)));
         let (clouds, parts): (Vec<_>, Vec<_>) = filled.unzip();
-        note_differences(&clouds, &parts);
+        let unplaced: Vec<&PointCloud> = clouds.iter().map(|(cloud, _)| cloud).collect();
+        differences(&unplaced).iter().for_each(|(index, note)| parts[*index].note(note));
         if clouds.len() > 1 {
             let boxes: Vec<[DVec3; 2]> = clouds.par_iter().map(world_box).collect();
             note_distant_inputs(&boxes, |at, note| parts[at].note(note));
@@ -356,12 +357,13 @@ fn posed<'a>(names: &[String], pose: &'a str) -> Option<(usize, &'a Path)> {
     })
 }
 
-/// Notes the fields and coordinate systems that the merged cloud loses because the inputs differ in them.
-fn note_differences(clouds: &[(PointCloud, DMat4)], parts: &[InputProgress<'_>]) {
-    let [(first, _), others @ ..] = clouds else { return };
-    for ((cloud, _), part) in clouds.iter().zip(parts) {
-        let has = |(other, _): &(PointCloud, DMat4), name: &str| other.fields().iter().any(|field| field.name == name);
-        let lost = cloud.fields().iter().filter(|field| !clouds.iter().all(|other| has(other, &field.name)));
+/// Notes on the fields and coordinate systems that the merged cloud loses because the inputs differ in them, each with
+/// the number of the input.
+fn differences(clouds: &[&PointCloud]) -> Vec<(usize, String)> {
+    let [first, others @ ..] = clouds else { return Vec::new() };
+    let mut notes = Vec::new();
+    for (index, cloud) in clouds.iter().enumerate() {
+        let lost = cloud.fields().iter().filter(|field| !clouds.iter().all(|other| other.field(&field.name).is_some()));
         let lost: Vec<String> = lost.map(|field| field.name.escape_debug().take(40).collect()).collect();
         if !lost.is_empty() {
             let more = if lost.len() > MAX_LISTED_NAMES {
@@ -370,15 +372,15 @@ fn note_differences(clouds: &[(PointCloud, DMat4)], parts: &[InputProgress<'_>])
                 String::new()
             };
             let names = lost[..lost.len().min(MAX_LISTED_NAMES)].join(", ");
-            part.note(&format!("not all inputs have {names}{more}; left out"));
+            notes.push((index, format!("not all inputs have {names}{more}; left out")));
         }
     }
-    if others.iter().any(|(other, _)| other.crs() != first.crs()) {
-        let unit = |cloud: &PointCloud| cloud.crs().unit;
-        let units = others.iter().any(|(other, _)| unit(other) != unit(first));
+    if others.iter().any(|other| other.crs() != first.crs()) {
+        let units = others.iter().any(|other| other.crs().unit != first.crs().unit);
         let what = if units { "coordinate systems and units" } else { "coordinate systems" };
-        parts[0].note(&format!("the inputs differ in their {what}; nothing is converted, the result has none"));
+        notes.push((0, format!("the inputs differ in their {what}; nothing is converted, the result has none")));
     }
+    notes
 }
 
 /// Parses the name of an input. A file must exist.

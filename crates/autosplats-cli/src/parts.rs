@@ -23,7 +23,7 @@ pub(crate) fn sample_step(clouds: &dyn Clouds) -> usize {
     clouds.points().unwrap_or(u64::from(u32::MAX)).div_ceil(SAMPLE).max(1) as usize
 }
 
-/// Points of the only input, which wait on the disk, and the room for work on them.
+/// Points of the inputs, which wait on the disk, and the room for work on them.
 pub(crate) struct Parts {
     pub(crate) clouds: Spool,
     pub(crate) points: u64,
@@ -53,7 +53,7 @@ pub(crate) fn check_room(room: &RoomArgs) -> Result<(), Failure> {
     }
 }
 
-/// Reads the only input onto the disk, if its points need more memory than there is. `None` if they are to be worked on
+/// Reads the inputs onto the disk, if their points need more memory than there is. `None` if they are to be worked on
 /// at once.
 pub(crate) fn parts(
     inputs: &Inputs,
@@ -69,8 +69,8 @@ pub(crate) fn parts(
     let Some(points) = inputs.points_at_most().filter(|_| !whole) else {
         if room.memory.is_some() && !whole {
             console.note(
-                "--memory: only one file or scene is worked on in parts, several inputs at once; make one octree of them \
-                 first, such as all.copc.laz",
+                "--memory: points with poses, of recordings, pipes or more than 1,000 inputs are worked on at once; make \
+                 one octree of them first, such as all.copc.laz",
             );
         }
         return Ok(None);
@@ -90,9 +90,9 @@ pub(crate) fn parts(
     let failed = |error| failure(error, output, &folder);
     let bar = Bar::on_file("reading", Path::new(&inputs.names()), console);
     let first = Part { whole: &bar, start: 0.0, len: 0.5 };
-    let Some(clouds) = inputs.in_parts(&first).map_err(failed)? else {
+    let Some(clouds) = inputs.in_parts(&first, console)? else {
         if room.memory.is_some() {
-            console.note("--memory: such a file cannot be read in parts, so all points are read at once");
+            console.note("--memory: not all of these formats can be read in parts, so all points are read at once");
         }
         return Ok(None);
     };

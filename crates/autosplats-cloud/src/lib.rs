@@ -34,6 +34,7 @@ mod identity;
 mod maps;
 mod memory;
 mod merge;
+mod merged;
 mod moved;
 mod output;
 mod pool;
@@ -70,6 +71,7 @@ pub use glam;
 pub use guard::guard;
 pub use memory::{available_memory, check_memory, own_memory, total_memory, usual_memory};
 pub use merge::normal_matrix;
+pub use merged::Merged;
 pub use output::{Draft, Existing, Output, abandon_drafts, is_there, write_whole};
 pub use pool::{PointPool, PointRun, SLOT_POINTS, SLOT_SHIFT};
 pub use precision::{

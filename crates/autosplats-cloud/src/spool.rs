@@ -161,7 +161,7 @@ fn empty(field: &Field) -> Field {
 
 impl PointCloud {
     /// All that is not a value per point.
-    fn clone_without_points(&self) -> Self {
+    pub(crate) fn clone_without_points(&self) -> Self {
         Self {
             origin: self.origin,
             axes: self.axes,

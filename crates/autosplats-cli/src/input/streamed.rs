@@ -6,12 +6,14 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use autosplats_cloud::glam::DMat4;
-use autosplats_cloud::{Clouds, Error, Outline, Part, PointCloud, Progress};
+use autosplats_cloud::{Clouds, Error, Merged, Outline, Part, PointCloud, Progress};
 use autosplats_formats::{Parts, TreeInput, describe, open_parts};
 use autosplats_scenes::Scene;
 use autosplats_sources::{Input, Source};
 
-use super::{Inputs, is_made, read_whole};
+use super::{Inputs, differences, failure, is_made, read_whole};
+use crate::console::Console;
+use crate::exit::{Exit, Failure};
 
 /// Points of a scene that are generated at a time.
 const SCENE_PART: usize = 1 << 20;
@@ -22,36 +24,83 @@ impl Inputs {
         self.list.iter().map(streamed).collect()
     }
 
-    /// Number of points of the only input, or more of them, if it may be read in parts.
+    /// Number of points of all inputs, or more of them, if they may be read in parts.
     pub(crate) fn points_at_most(&self) -> Option<u64> {
-        match self.list.as_slice() {
-            [input] if is_plain(input) => match &input.source {
-                // What comes through a pipe can be read only once.
-                Source::File(path) if !path.is_file() => None,
-                Source::File(path) => match describe(path, &input.options) {
-                    Ok(description) if description.points.is_some() => description.points,
-                    // Text does not state it. No row is shorter than three digits, each with a byte behind it.
-                    _ => path.metadata().ok().map(|metadata| metadata.len() / 6),
-                },
-                Source::Scene(_, count) if !input.moves() => Some(*count as u64),
-                _ => None,
-            },
-            _ => None,
+        if self.list.len() > MOST_INPUTS {
+            return None;
         }
+        self.list.iter().map(points_at_most).sum()
     }
 
-    /// The only input, to be read in parts. `None` if it has to be read whole.
-    pub(crate) fn in_parts(&self, progress: &dyn Progress) -> Result<Option<Box<dyn Clouds + '_>>, Error> {
-        let [input] = self.list.as_slice() else { return Ok(None) };
-        match &input.source {
-            Source::File(path) if is_plain(input) => {
-                Ok(open_parts(path, &input.options, progress)?.map(|parts| Box::new(parts) as Box<dyn Clouds>))
+    /// The inputs, to be read in parts, joined as whole ones are. `None` if they have to be read whole.
+    pub(crate) fn in_parts(
+        &self,
+        progress: &dyn Progress,
+        console: &Console,
+    ) -> Result<Option<Box<dyn Clouds + '_>>, Failure> {
+        let len = 1.0 / self.list.len() as f32;
+        let several = self.list.len() > 1;
+        let (mut kept, mut all) = (Vec::new(), Vec::new());
+        for (index, input) in self.list.iter().enumerate() {
+            match parts_of(input, &Part { whole: progress, start: index as f32 * len, len }) {
+                Ok(None) => return Ok(None),
+                Ok(Some(clouds)) => {
+                    kept.push(input);
+                    all.push(clouds);
+                }
+                // Of the tiles of a survey, some may have no point of a class.
+                Err(Error::NothingKept { filter, points, .. }) if several => {
+                    console.note(format!("{}: --keep {filter} leaves none of its {points} points", input.name));
+                }
+                Err(error) => return Err(failure(input, error)),
             }
-            Source::Scene(scene, count) if is_plain(input) && !input.moves() => {
-                Ok(Some(Box::new(SceneClouds { name: &input.name, scene, count: *count })))
-            }
-            _ => Ok(None),
         }
+        if !several {
+            return Ok(all.pop());
+        }
+        if all.is_empty() {
+            return Err(Failure::new(Exit::Input, format!("{}: --keep leaves none of their points", self.names())));
+        }
+        let merged = Merged::new(self.names().into(), all, &()).map_err(Failure::from)?;
+        if let Some(empty) = merged.heads().iter().position(PointCloud::is_empty) {
+            return Err(Failure::new(Exit::Input, format!("{}: there are no points in it", kept[empty].name)));
+        }
+        for (index, note) in differences(&merged.heads().iter().collect::<Vec<_>>()) {
+            console.note(format!("{}: {note}", kept[index].name));
+        }
+        Ok(Some(Box::new(merged)))
+    }
+}
+
+/// Most inputs that are read in parts: each stays open.
+const MOST_INPUTS: usize = 1000;
+
+/// Number of points of an input, or more of them. `None` if it has to be read whole.
+fn points_at_most(input: &Input) -> Option<u64> {
+    match &input.source {
+        _ if !is_plain(input) => None,
+        // What comes through a pipe can be read only once.
+        Source::File(path) if !path.is_file() => None,
+        Source::File(path) => match describe(path, &input.options) {
+            Ok(description) if description.points.is_some() => description.points,
+            // Text does not state it. No row is shorter than three digits, each with a byte behind it.
+            _ => path.metadata().ok().map(|metadata| metadata.len() / 6),
+        },
+        Source::Scene(_, count) if !input.moves() => Some(*count as u64),
+        _ => None,
+    }
+}
+
+/// An input, to be read in parts. `None` if it has to be read whole.
+fn parts_of<'a>(input: &'a Input, progress: &dyn Progress) -> Result<Option<Box<dyn Clouds + 'a>>, Error> {
+    match &input.source {
+        Source::File(path) if is_plain(input) => {
+            Ok(open_parts(path, &input.options, progress)?.map(|parts| Box::new(parts) as Box<dyn Clouds>))
+        }
+        Source::Scene(scene, count) if is_plain(input) && !input.moves() => {
+            Ok(Some(Box::new(SceneClouds { name: &input.name, scene, count: *count })))
+        }
+        _ => Ok(None),
     }
 }
 

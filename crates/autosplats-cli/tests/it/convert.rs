@@ -154,6 +154,35 @@ fn more_points_than_memory_holds_are_converted_in_parts() {
     let outcome = folder.succeed(&["convert", "scan.laz", "b.e57", "--memory", "5M"]);
     assert!(outcome.stderr.contains("note: --memory: E57"), "{}", outcome.stderr);
     folder.fail(&["convert", "scan.laz", "b.ply", "--memory", "5M", "--temp", "nowhere"], 4, &["nowhere"]);
-    let outcome = folder.succeed(&["convert", "sphere.ply", "scan.laz", "b.ply", "--memory", "5M"]);
-    assert!(outcome.stderr.contains("note: --memory"), "several inputs are joined at once: {}", outcome.stderr);
+    folder.write("pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n");
+    let outcome =
+        folder.succeed(&["convert", "scan.laz", "b.ply", "--force", "--memory", "5M", "--pose", "scan.laz=pose.txt"]);
+    assert!(!outcome.stderr.contains("note: --memory"), "a pose that moves nothing: {}", outcome.stderr);
+    folder.write("pose.txt", "1 0 0 1\n0 1 0 0\n0 0 1 0\n");
+    let outcome =
+        folder.succeed(&["convert", "scan.laz", "b.ply", "--force", "--memory", "5M", "--pose", "scan.laz=pose.txt"]);
+    assert!(outcome.stderr.contains("note: --memory"), "with a pose all at once: {}", outcome.stderr);
+}
+
+#[test]
+fn several_inputs_of_more_points_than_memory_holds_are_joined_in_parts() {
+    let folder = Folder::with_sphere();
+    folder.succeed(&["convert", "scene:figure:60K", "a.laz"]);
+    folder.succeed(&["convert", "scene:statue:50K", "b.ply"]);
+    folder.succeed(&["normals", "sphere.ply", "c.ply"]);
+    for inputs in [&["a.laz", "b.ply", "c.ply"][..], &["b.ply", "scene:cathedral:40K", "a.laz"]] {
+        let joined = |memory: &[&str], options: &[&str]| {
+            let words = [&["convert"], inputs, &["-o", "out.ply", "--force"], options, memory].concat();
+            (folder.succeed(&words).stderr, folder.read("out.ply"))
+        };
+        for options in [&[][..], &["--every", "7"], &["--voxel", "0.05"]] {
+            let ((said, whole), (said_in_parts, parts)) = (joined(&[], options), joined(&["--memory", "5M"], options));
+            assert!(parts == whole, "{inputs:?} {options:?}: {said_in_parts}");
+            let notes = |said: &str| said.lines().filter(|line| line.contains("left out")).map(str::to_owned).collect();
+            let (whole, parts): (Vec<String>, Vec<String>) = (notes(&said), notes(&said_in_parts));
+            assert_eq!(parts, whole, "{inputs:?}");
+        }
+    }
+    folder.write("empty.xyz", "");
+    folder.fail(&["convert", "a.laz", "empty.xyz", "-o", "b.las", "--memory", "5M"], 3, &["empty.xyz"]);
 }

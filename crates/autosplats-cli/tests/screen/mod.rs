@@ -290,12 +290,17 @@ impl Screen {
         [4, 5].into_iter().for_each(|kind| self.fake(kind, 1, [0, 0]));
     }
 
-    /// Drags in eight steps.
+    /// Drags in eight steps. Lets go when the screen has changed, as a person would: on a busy machine all steps may
+    /// fall between two frames of the window, which then sees no drag.
     pub(crate) fn drag(&self, button: u8, from: [i16; 2], to: [i16; 2]) {
+        let (before, start) = (self.look(), Instant::now());
         self.point(from);
         self.fake(4, button, [0, 0]);
         for step in 1..=8 {
             self.point([0, 1].map(|i| from[i] + (to[i] - from[i]) * step / 8));
+        }
+        while self.look() == before && start.elapsed() < STEP_TIMEOUT {
+            std::thread::sleep(SCREENSHOT_INTERVAL);
         }
         self.fake(5, button, [0, 0]);
     }

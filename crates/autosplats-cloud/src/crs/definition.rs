@@ -95,7 +95,7 @@ impl Unit {
     }
 
     /// EPSG code.
-    pub(crate) fn epsg(self) -> u16 {
+    pub fn epsg(self) -> u16 {
         match self {
             Self::Metre => 9001,
             Self::Millimetre => 1025,

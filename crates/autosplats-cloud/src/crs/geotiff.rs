@@ -59,7 +59,7 @@ impl GeoKeys {
 
     /// Decodes the coordinate system.
     pub fn read(&self) -> CrsDefinition {
-        let code = |key| self.number(key).filter(|&code| code != 0 && code != USER_DEFINED).map(u32::from);
+        let code = |key| self.code(key);
         let model = self.number(MODEL);
         let projected = code(PROJECTED);
         let is_projected = model == Some(1) || projected.is_some();
@@ -92,6 +92,16 @@ impl GeoKeys {
             geotiff: Some(self.clone()),
         };
         CrsDefinition { crs, geocentric: model == Some(3), heights: vertical }
+    }
+
+    /// EPSG code of the system of heights.
+    pub fn heights(&self) -> Option<u32> {
+        self.code(VERTICAL)
+    }
+
+    /// The value of a key that is a code, unless it says that there is none.
+    fn code(&self, key: u16) -> Option<u32> {
+        self.number(key).filter(|&code| code != 0 && code != USER_DEFINED).map(u32::from)
     }
 
     /// The keys without those of heights.

@@ -353,12 +353,12 @@ fn real_files_survive_writing() {
                 assert!(a == b, "{file} as {name}: {}", field.name);
             }
             assert_eq!(back.fields().len(), cloud.fields().len(), "{file} as {name}: nothing is added");
-            assert_eq!(back.crs().wkt, cloud.crs().wkt, "{file} as {name}: coordinate system");
-            assert_eq!(
-                (back.crs().unit, back.crs().epsg, &back.crs().name),
-                (cloud.crs().unit, cloud.crs().epsg, &cloud.crs().name),
-                "{file} as {name}: coordinate system"
-            );
+            let system = |cloud: &PointCloud| (cloud.crs().unit, cloud.crs().epsg, cloud.crs().geotiff.clone());
+            assert_eq!(system(&back), system(&cloud), "{file} as {name}: coordinate system");
+            // A system known by its code gets text, which has the code's own name.
+            let stated = cloud.crs().wkt.is_some() || back.crs().wkt.is_none();
+            let text = |cloud: &PointCloud| (cloud.crs().name.clone(), cloud.crs().wkt.clone());
+            assert!(!stated || text(&back) == text(&cloud), "{file} as {name}: coordinate system");
         }
     }
 }

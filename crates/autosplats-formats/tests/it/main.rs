@@ -15,6 +15,7 @@ mod field_text;
 mod formats;
 mod gltf;
 mod hostile;
+mod interop;
 mod las;
 mod las_faults;
 mod las_writing;

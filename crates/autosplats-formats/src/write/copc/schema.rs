@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::{extras::Extras, frame::Lattice};
 use crate::{
     las::{self, EXTRA_DESCRIPTOR},
-    write::las::today,
+    write::las::{today, well_known_text},
 };
 
 /// Most steps from the offset, slightly less than 32 bits hold.
@@ -130,9 +130,8 @@ fn crs(inputs: &[Holds], progress: &dyn Progress) -> Result<Crs, Error> {
         let unknown = named(inputs, |input| plain(&input.crs));
         progress.note(&format!("{unknown} without a coordinate system are taken to be in that of the others"));
     }
-    if first.crs.wkt.is_none() && first.crs.geotiff.is_some() {
-        progress
-            .note("the coordinate system is kept as GeoTIFF keys, as in the input; some programs look for WKT only");
+    if first.crs.geotiff.is_some() && well_known_text(&first.crs).is_none() {
+        progress.note("the coordinate system is kept as GeoTIFF keys, as in the input, where few programs look for it");
     }
     Ok(first.crs.clone())
 }

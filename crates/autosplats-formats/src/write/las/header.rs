@@ -9,6 +9,7 @@ use laz::LazVlr;
 use super::{
     grid::Grid,
     shape::{Shape, Survey},
+    wkt::well_known_text,
 };
 use crate::las::{self, EXTRA_DESCRIPTOR, VLR_HEADER};
 
@@ -94,13 +95,13 @@ impl Head<'_> {
         let Self { format, record_len, totals, records, .. } = *self;
         let wide = las::is_wide(format);
         let compressed = records.iter().any(|record| record.user == LazVlr::USER_ID);
-        let wkt = records.iter().any(|record| (record.user, record.id) == (las::PROJECTION, las::WKT));
         let header_len = if wide { HEADER_LEN_LAS14 } else { LEGACY_HEADER_LEN };
         let start = header_len + records.iter().map(|record| VLR_HEADER + record.data.len()).sum::<usize>();
         let mut bytes = Vec::with_capacity(start);
         bytes.extend(b"LASF");
         put(&mut bytes, [0_u16.to_le_bytes()]);
-        put(&mut bytes, [(u16::from(self.standard_time) | if wide && wkt { 16 } else { 0 }).to_le_bytes()]);
+        // The specification has bit 4 for all points of LAS 1.4; readers refuse files without it.
+        put(&mut bytes, [(u16::from(self.standard_time) | if wide { 16 } else { 0 }).to_le_bytes()]);
         bytes.extend([0; 16]);
         bytes.extend([1, if wide { 4 } else { 2 }]);
         bytes.extend(padded::<32>("OTHER"));
@@ -160,7 +161,8 @@ pub(super) fn bytes(
 pub(in crate::write) fn crs_records(crs: &Crs, wide: bool) -> Vec<Record> {
     let mut records = Vec::new();
     let mut record = |id, description, data| records.push(Record { user: las::PROJECTION, id, description, data });
-    let mut text = crs.wkt.clone().unwrap_or_default().into_bytes();
+    let own = if wide { well_known_text(crs) } else { crs.wkt.clone() };
+    let mut text = own.unwrap_or_default().into_bytes();
     text.push(0);
     let wkt = text.len() > 1 && text.len() <= MAX_VLR;
     if wkt {

@@ -10,6 +10,7 @@ mod grid;
 mod header;
 mod plan;
 mod shape;
+mod wkt;
 
 use std::{
     fs::File,
@@ -26,6 +27,7 @@ use self::{grid::Grid, shape::choose};
 pub(super) use self::{
     plan::{Plan, finite},
     shape::{Shape, Survey},
+    wkt::well_known_text,
 };
 use super::{Format, Job};
 use crate::las;
