@@ -39,8 +39,10 @@ impl Blocks {
 
     /// Calls `change` for the part of each row of pixels that lies in a block with points.
     pub(crate) fn change<T: Send>(&self, pixels: &mut [T], change: impl Fn(&mut [T]) + Sync) {
-        // Nothing is zero pixels wide.
-        let rows = pixels.par_chunks_mut((OCCUPANCY_BLOCK_PX * self.width).max(1)).enumerate();
+        if self.held.is_empty() {
+            return;
+        }
+        let rows = pixels.par_chunks_mut(OCCUPANCY_BLOCK_PX * self.width).enumerate();
         rows.for_each(|(block_row, pixels)| {
             for row in pixels.chunks_mut(self.width) {
                 let parts = row.chunks_mut(OCCUPANCY_BLOCK_PX).enumerate();

@@ -90,7 +90,8 @@ impl Past {
         self.reprojection = past.and_then(|(past, _)| Reprojection::new(&now, &past));
         let PastRadii { seen, pixels, blocks } = &mut self.next;
         *seen = Some((now, k));
-        blocks.change(pixels, |pixels| pixels.iter_mut().for_each(|radius| *radius.get_mut() = 0));
+        // A frame that is given up before it keeps radii has none.
+        std::mem::take(blocks).change(pixels, |pixels| pixels.iter_mut().for_each(|radius| *radius.get_mut() = 0));
         fit_atomic(pixels, now.view.width as usize * now.view.height as usize);
     }
 
