@@ -39,6 +39,7 @@ mod normals;
 mod points;
 mod project;
 mod renderer;
+mod room;
 mod search;
 mod shade;
 mod simd;

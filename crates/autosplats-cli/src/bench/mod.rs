@@ -54,6 +54,8 @@ struct Run {
     /// Upload time of the first frame, which creates and fills the buffers, in milliseconds. Later uploads are in the
     /// timings.
     first_upload_ms: f64,
+    /// Time to the finished picture of the first frame, in milliseconds: that of a still, in memory never used before.
+    first_picture_ms: f64,
     /// Time from the request for a picture to the finished picture, in milliseconds.
     picture_ms: f64,
     timings_ms: Timings,
@@ -119,7 +121,7 @@ fn measure(
     settle_first_radius(&mut settings, first_radius, renderer, cloud, &camera, args.size, console)?;
     let bar = Bar::spinner(&format!("{} frames on {}", args.frames, device.name), console);
     let mut samples: Vec<(f64, Timings, Vec<PassTime>)> = Vec::new();
-    let (mut counts, mut first_upload_ms) = (Counts::default(), 0.0);
+    let (mut counts, mut first_upload_ms, mut first_picture_ms) = (Counts::default(), 0.0, 0.0);
     // A renderer takes clouds of another identity as new points, so two alternating clouds are always new.
     let other = args.stream.then(|| copy(cloud)).transpose()?;
     for frame in 0..WARM_UP_FRAMES + args.frames {
@@ -128,7 +130,7 @@ fn measure(
         let rendered = renderer.render_while(cloud, &camera, args.size, &settings, &console.goes_on())?;
         let picture_ms = started.elapsed().as_secs_f64() * 1e3;
         if frame == 0 {
-            (counts, first_upload_ms) = (rendered.counts, rendered.timings.upload);
+            (counts, first_upload_ms, first_picture_ms) = (rendered.counts, rendered.timings.upload, picture_ms);
         }
         if frame >= WARM_UP_FRAMES {
             samples.push((picture_ms, rendered.timings, rendered.passes.to_vec()));
@@ -143,6 +145,7 @@ fn measure(
     Ok(Run {
         counts,
         first_upload_ms,
+        first_picture_ms,
         picture_ms: median(samples.iter().map(|(picture_ms, ..)| *picture_ms)),
         timings_ms: Timings {
             upload: of(&|timings| timings.upload),
@@ -196,7 +199,9 @@ impl Bench<'_> {
              of {frames} frames",
             cloud.len()
         )];
-        for Run { device, counts, first_upload_ms, picture_ms, timings_ms, passes, unconverged } in runs {
+        for run in runs {
+            let Run { device, counts, first_upload_ms, first_picture_ms, picture_ms, timings_ms, passes, unconverged } =
+                run;
             lines.push(String::new());
             lines.push(device.describe());
             let Counts { visible, active, recovered, .. } = counts;
@@ -225,6 +230,7 @@ impl Bench<'_> {
             }
             line("frame", *frame);
             line("picture on the host", *picture_ms);
+            line("first picture", *first_picture_ms);
             if timings_ms.upload > 0.01 {
                 line("upload of new points", timings_ms.upload);
             }

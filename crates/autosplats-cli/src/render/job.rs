@@ -100,7 +100,9 @@ impl Job {
                 opaque.display()
             )));
         }
-        let settings = settings(&surface, look, needs_layers);
+        let mut settings = settings(&surface, look, needs_layers);
+        // A single picture leaves nothing to a next one.
+        settings.reconstruction.coherent = film.is_some() || !camera_path.is_empty();
         settings.check()?;
 
         let save_camera = camera.save_camera.clone();

@@ -375,7 +375,10 @@ fn a_bench_tells_every_stage() {
     }
     let json = folder.succeed(&[&bench[..], &["--json"]].concat()).stdout;
     let report: Value = serde_json::from_str(&json).expect("it is JSON");
-    assert!(report["runs"][0]["timings_ms"]["frame"].as_f64().is_some_and(|ms| ms > 0.0), "{report}");
+    let run = &report["runs"][0];
+    for times in [&run["timings_ms"]["frame"], &run["first_picture_ms"]] {
+        assert!(times.as_f64().is_some_and(|ms| ms > 0.0), "{report}");
+    }
     folder.fail(&["bench", "--scene", "cave"], 2, &["cathedral"]);
     folder.fail(&["bench", "--frames", "0"], 2, &["1 to 100000"]);
 }
@@ -417,4 +420,24 @@ fn cameras_of_open3d_see_what_they_state() {
     let out = folder.succeed(&[&["render", "sphere.ply", "-o", "b.png", "--camera", "aside.json"], &size[..]].concat());
     assert!(out.stderr.contains("aside.json: its axis is put in the middle"), "{}", out.stderr);
     folder.fail(&["render", "sphere.ply", "-o", "c.png", "--camera", "unposed.json"], 2, &["without a pose", "--eye"]);
+}
+
+#[test]
+fn dense_pictures_take_the_memory_that_is_asked_for() {
+    let folder = Folder::new();
+    let peak = |size: &str| {
+        let outcome = folder.succeed(
+            &[
+                &["render", "scene:cathedral:800K", "-o", "a.png", "--supersample", "1", "--size", size][..],
+                &["--backend", "cpu", "--json"],
+            ]
+            .concat(),
+        );
+        let report: Value = serde_json::from_str(&outcome.stdout).expect("JSON");
+        report["memory"]["peak"].as_u64()
+    };
+    // Only some systems tell.
+    let (Some(points), Some(all)) = (peak("8x8"), peak("960x540")) else { return };
+    let (taken, told) = (all - points, 960 * 540 * autosplats::BYTES_PER_PIXEL);
+    assert!(taken < told && taken + (64 << 20) > told, "{taken} bytes, not up to {told}");
 }

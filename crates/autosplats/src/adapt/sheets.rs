@@ -16,6 +16,7 @@ use super::rules::Goal;
 use crate::camera::View;
 use crate::cancel::Cancel;
 use crate::fit::Surfel;
+use crate::room::fit;
 
 mod blend;
 #[cfg(test)]
@@ -131,7 +132,7 @@ impl Sheets {
     /// Discards the sheets of the last frame.
     pub(super) fn clear(&mut self, cells: &Cells) {
         let len = cells.levels.get(SHEET_LEVELS[0]).map_or(0, |level| level.columns * level.rows.len());
-        self.stacks.resize(len, CellSheets::default());
+        fit(&mut self.stacks, len);
         self.fitted.clear();
         self.fitted.resize(len, false);
         self.asked.clear();

@@ -10,6 +10,7 @@ use super::{Surfel, Surfels};
 use crate::camera::View;
 use crate::cancel::Cancel;
 use crate::project::{ScreenPoint, ScreenPoints};
+use crate::room;
 use crate::search::{LANES, Lanes, NeighborhoodBlock, Neighborhoods};
 use crate::simd::F32s;
 
@@ -69,7 +70,11 @@ pub(crate) fn fit(
     cancel: &Cancel<'_>,
 ) {
     let first = surfels.len();
-    surfels.resize(first + queries.len(), Surfel::default());
+    if first == 0 {
+        room::fit(surfels, queries.len());
+    } else {
+        surfels.resize(first + queries.len(), Surfel::default());
+    }
     let out = surfels[first..].par_chunks_mut(TASK_BLOCKS * LANES);
     let queries = queries.par_chunks(TASK_BLOCKS * LANES);
     let blocks = neighborhoods.blocks.par_chunks(TASK_BLOCKS);

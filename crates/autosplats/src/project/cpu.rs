@@ -7,19 +7,21 @@ use glam::Vec3;
 use rayon::iter::Either;
 use rayon::prelude::*;
 
+pub(super) use super::blocks::OCCUPANCY_BLOCK_PX;
 use super::near::{NearCells, cell, clamped_pixel, first_octave};
 use super::sixteenths::{Sixteenths, half, sixteenth, sixteenths_at};
-use super::{Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints, SlotTable};
+use super::{Blocks, Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints, SlotTable};
 use crate::camera::View;
 use crate::cancel::Cancel;
 use crate::points::Points;
+use crate::room::{fit, fit_atomic};
 
 /// Points projected per task.
 const TASK_POINTS: usize = 16 * 1024;
 /// Points transformed at a time.
 const LANES: usize = 16;
-/// Key of a slot that no point falls into.
-const EMPTY_KEY: u64 = u64::MAX;
+/// Key of a slot that no point falls into. New memory is zero, and need not be touched where no points are.
+const EMPTY_KEY: u64 = 0;
 /// Height of a strip in mean distances between screen points. Sixteen points of a strip then find their ten nearest
 /// neighbours among about a hundred candidates, in this strip and the ones above and below.
 pub(super) const STRIP_SPACINGS: f32 = 3.0;
@@ -27,14 +29,11 @@ pub(super) const STRIP_SPACINGS: f32 = 3.0;
 /// its normal. A point further behind belongs to another surface, which is usually hidden.
 // Differs from the paper: the paper keeps the nearest point of each pixel only.
 pub(super) const MAX_SECOND_DEPTH_PX: f32 = 8.0;
-/// Side in pixels of the blocks that separate covered from empty screen when the density is measured.
-pub(super) const OCCUPANCY_BLOCK_PX: usize = 16;
 
 /// Projects clouds. All buffers but the two lists `active` and `passive` are reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Projector {
-    /// Per pixel or half pixel, `depth bits << 32 | ordinal of the point`. The bits of positive floats order like the
-    /// floats.
+    /// Key of the nearest point per pixel or half pixel. All are empty between frames.
     keys: Vec<AtomicU64>,
     near: NearCells,
     screen: ScreenPoints,
@@ -60,7 +59,7 @@ impl Projector {
         near.clear(view);
         let found = (lists_near && view.perspective).then_some(&*near);
         screen.dropped = nearest_per_pixel(&points, view, halves, keys, &mut screen.sixteenths, found, cancel);
-        let keys = Keys::settle(keys, view, halves);
+        let keys = Keys::settle(keys, screen.sixteenths.blocks(), view, halves);
         let spacing_px = keys.mean_spacing();
         compact(&points, view, &keys, spacing_px, screen);
         near.list(&points, view, k as usize + 1);
@@ -84,19 +83,17 @@ struct Keys<'a> {
 
 impl<'a> Keys<'a> {
     /// Empties the slots of points far behind the other point of their pixel, and counts the rest per block.
-    fn settle(slots: &'a mut [AtomicU64], view: &View, halves: bool) -> Self {
+    fn settle(slots: &'a mut [AtomicU64], blocks: &Blocks, view: &View, halves: bool) -> Self {
         let per_pixel = 1 + usize::from(halves);
         let width = view.width as usize;
         let mut occupied =
             vec![0; width.div_ceil(OCCUPANCY_BLOCK_PX) * (view.height as usize).div_ceil(OCCUPANCY_BLOCK_PX)];
         let block_rows = slots.par_chunks_mut(OCCUPANCY_BLOCK_PX * width * per_pixel);
-        block_rows.zip(occupied.par_chunks_mut(width.div_ceil(OCCUPANCY_BLOCK_PX))).for_each(|(rows, occupied)| {
+        let block_rows = block_rows.zip(occupied.par_chunks_mut(width.div_ceil(OCCUPANCY_BLOCK_PX)));
+        block_rows.enumerate().for_each(|(block_row, (rows, occupied))| {
             for row in rows.chunks_mut(width * per_pixel) {
-                for (block, count) in row.chunks_mut(OCCUPANCY_BLOCK_PX * per_pixel).zip(&mut *occupied) {
-                    let all = block.iter_mut().fold(EMPTY_KEY, |all, key| all & *key.get_mut());
-                    if all == EMPTY_KEY {
-                        continue;
-                    }
+                let parts = row.chunks_mut(OCCUPANCY_BLOCK_PX * per_pixel).zip(&mut *occupied).enumerate();
+                for (_, (block, count)) in parts.filter(|&(column, _)| blocks.holds(column, block_row)) {
                     if halves {
                         block.chunks_exact_mut(2).for_each(|pair| erase_far_second(pair, view));
                     }
@@ -136,7 +133,7 @@ impl<'a> Keys<'a> {
     }
 }
 
-/// Fills `keys` with the nearest point of each pixel or half pixel, and `sixteenths` with all points.
+/// Fills `keys`, which are empty, with the nearest point of each pixel or half pixel, and `sixteenths` with all points.
 fn nearest_per_pixel(
     points: &SlotTable<'_>,
     view: &View,
@@ -147,8 +144,7 @@ fn nearest_per_pixel(
     cancel: &Cancel<'_>,
 ) -> Dropped {
     let pixels = view.width as usize * view.height as usize;
-    keys.resize_with(pixels << u32::from(halves), AtomicU64::default);
-    keys.par_chunks_mut(1 << 16).for_each(|keys| keys.iter_mut().for_each(|key| *key.get_mut() = EMPTY_KEY));
+    fit_atomic(keys, pixels << u32::from(halves));
     let keys = keys.as_slice();
     sixteenths.clear(view);
     let sixteenths = &*sixteenths;
@@ -224,11 +220,14 @@ fn project_chunk<const NEAR: bool>(
                 OUTSIDE => dropped.outside += 1,
                 slot => {
                     let ordinal = ordinal + (group * LANES + lane) as u32;
-                    let key = u64::from(z[lane].to_bits()) << 32 | u64::from(ordinal);
+                    let key = key(z[lane], ordinal);
                     // Most points lose in a marked sixteenth: without a write they take no cache line from other
                     // threads.
-                    if key < before[lane] {
-                        keys[slot as usize].fetch_min(key, Ordering::Relaxed);
+                    if key > before[lane] {
+                        keys[slot as usize].fetch_max(key, Ordering::Relaxed);
+                    }
+                    if before[lane] == EMPTY_KEY {
+                        sixteenths.blocks.hold(slot >> u32::from(halves));
                     }
                     if held[lane] >> part[lane] & 1 == 0 {
                         sixteenths.add(slot >> u32::from(halves), part[lane]);
@@ -263,23 +262,29 @@ fn is_owned(key: &AtomicU64) -> bool {
     key.load(Ordering::Relaxed) != EMPTY_KEY
 }
 
-/// Depth of a point from its key.
-fn depth_of(key: u64) -> f32 {
-    f32::from_bits((key >> 32) as u32)
+/// Key of a point, larger for nearer points, then for earlier ones. The bits of positive floats order like the floats.
+#[inline(always)]
+fn key(depth: f32, ordinal: u32) -> u64 {
+    !(u64::from(depth.to_bits()) << 32 | u64::from(ordinal))
+}
+
+/// Depth and ordinal of a point from its key.
+fn point_of(key: u64) -> (f32, u32) {
+    (f32::from_bits((!key >> 32) as u32), !key as u32)
 }
 
 /// Empties the slot of a pixel's farther point if it lies far behind the nearer.
 #[inline(always)]
 fn erase_far_second(pair: &mut [AtomicU64], view: &View) {
     let [one, other] = [0, 1].map(|half| *pair[half].get_mut());
-    let [near, far] = [one.min(other), one.max(other)];
-    let near = depth_of(near);
-    if far != EMPTY_KEY && depth_of(far) > near + MAX_SECOND_DEPTH_PX * view.pixel_size(near) {
+    let [near, far] = [one.max(other), one.min(other)];
+    let ((near, _), (depth, _)) = (point_of(near), point_of(far));
+    if far != EMPTY_KEY && depth > near + MAX_SECOND_DEPTH_PX * view.pixel_size(near) {
         *pair[usize::from(other == far)].get_mut() = EMPTY_KEY;
     }
 }
 
-/// Lists the owners of slots in cell order.
+/// Lists the owners of slots in cell order, and empties the slots.
 fn compact(cloud: &SlotTable<'_>, view: &View, keys: &Keys, spacing_px: f32, screen: &mut ScreenPoints) {
     let [width, height] = [view.width as usize, view.height as usize];
     let strip_px = ((STRIP_SPACINGS * spacing_px).round() as usize).clamp(1, 256);
@@ -310,8 +315,8 @@ fn compact(cloud: &SlotTable<'_>, view: &View, keys: &Keys, spacing_px: f32, scr
         })
         .collect();
     let total = strip_len.iter().sum::<u32>() as usize;
-    points.resize(total, ScreenPoint::default());
-    source.resize(total, 0);
+    fit(points, total);
+    fit(source, total);
     cells.start[strips * width] = total as u32;
 
     let mut first = 0;
@@ -334,10 +339,11 @@ fn compact(cloud: &SlotTable<'_>, view: &View, keys: &Keys, spacing_px: f32, scr
         };
         for x in (0..keys.columns()).filter(is_occupied).flat_map(|column| keys.columns_px(column)) {
             for (y, key) in rows.clone().flat_map(|y| keys.at(x, y).iter().map(move |key| (y, key))) {
-                let key = key.load(Ordering::Relaxed);
-                if key != EMPTY_KEY {
+                let (_, ordinal) = point_of(key.load(Ordering::Relaxed));
+                if is_owned(key) {
                     points[next].pixel = (y << 16 | x) as u32;
-                    source[next] = cloud.names.index(key as u32);
+                    source[next] = cloud.names.index(ordinal);
+                    key.store(EMPTY_KEY, Ordering::Relaxed);
                     next += 1;
                 }
             }

@@ -20,6 +20,7 @@
 //! Every point on the screen marks the sixteenth of its pixel that it falls into, with one bit that points there share.
 //! The splatting finds the borders of surfaces from these bits.
 
+mod blocks;
 mod cpu;
 mod device_cloud;
 pub(crate) mod gpu;
@@ -29,6 +30,7 @@ mod slots;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use blocks::{Blocks, OCCUPANCY_BLOCK_PX};
 pub(crate) use cpu::Projector;
 #[cfg(test)]
 pub(crate) use device_cloud::ChunkUniform;

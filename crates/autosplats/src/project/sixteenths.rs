@@ -4,10 +4,9 @@
 
 use std::sync::atomic::{AtomicU16, Ordering};
 
-use rayon::prelude::*;
-
-use super::whole;
+use super::{Blocks, whole};
 use crate::camera::View;
+use crate::room::fit_atomic;
 
 /// Sixteenths along each side of a pixel.
 pub(super) const PER_SIDE: u32 = 4;
@@ -17,14 +16,22 @@ pub(super) const PER_SIDE: u32 = 4;
 pub(crate) struct Sixteenths {
     width: usize,
     pixels: Vec<AtomicU16>,
+    pub(super) blocks: Blocks,
 }
 
 impl Sixteenths {
     /// Resizes to `view` and clears all bits.
     pub(crate) fn clear(&mut self, view: &View) {
-        self.width = view.width as usize;
-        self.pixels.resize_with(self.width * view.height as usize, AtomicU16::default);
-        self.pixels.par_chunks_mut(1 << 16).for_each(|pixels| pixels.iter_mut().for_each(|pixel| *pixel.get_mut() = 0));
+        let size = [view.width, view.height].map(|side| side as usize);
+        self.blocks.change(&mut self.pixels, |pixels| pixels.iter_mut().for_each(|pixel| *pixel.get_mut() = 0));
+        self.blocks = Blocks::new(size);
+        self.width = size[0];
+        fit_atomic(&mut self.pixels, size[0] * size[1]);
+    }
+
+    /// The blocks that hold points.
+    pub(crate) fn blocks(&self) -> &Blocks {
+        &self.blocks
     }
 
     /// Marks a sixteenth of a pixel as holding a point.
@@ -59,10 +66,12 @@ impl Sixteenths {
 impl Sixteenths {
     /// Sixteenths of a screen of this size with points at `places`, in pixels.
     pub(crate) fn with([width, height]: [usize; 2], places: impl IntoIterator<Item = [f32; 2]>) -> Self {
-        let mut sixteenths = Self { width, pixels: Vec::new() };
+        let mut sixteenths = Self { width, pixels: Vec::new(), blocks: Blocks::new([width, height]) };
         sixteenths.pixels.resize_with(width * height, AtomicU16::default);
         for [x, y] in places.into_iter().map(sixteenths_at) {
-            sixteenths.add(y / PER_SIDE * width as u32 + x / PER_SIDE, sixteenth([x, y]));
+            let pixel = y / PER_SIDE * width as u32 + x / PER_SIDE;
+            sixteenths.add(pixel, sixteenth([x, y]));
+            sixteenths.blocks.hold(pixel);
         }
         sixteenths
     }
@@ -77,7 +86,7 @@ impl Sixteenths {
 impl Clone for Sixteenths {
     fn clone(&self) -> Self {
         let pixels = (0..self.pixels.len()).map(|pixel| self.of(pixel).into()).collect();
-        Self { width: self.width, pixels }
+        Self { width: self.width, pixels, blocks: self.blocks.clone() }
     }
 }
 

@@ -76,12 +76,12 @@ pub(crate) const MIN_CROWDED_CANDIDATES: usize = MAX_CANDIDATES / 8;
 pub(crate) const BOUND_STEP: f32 = 1.25;
 
 /// One value per neighbourhood of a block.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct Lanes(pub(crate) [f32; LANES]);
 
 /// Sixteen neighbourhoods, side by side for SIMD. Sums are taken about the point itself, which is not counted.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct NeighborhoodBlock {
     /// Number of neighbours; 0 if the point is an outlier.

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{Image, linear_steps, srgb};
+use super::encode::{encode_bounds, encode_table, nearest};
+use super::{Image, linear_steps};
 
 impl Image {
     /// A smaller picture, each pixel the mean of `factor`² pixels in linear light. Uncovered pixels have no weight in
@@ -12,21 +13,25 @@ impl Image {
     /// If `factor` is 0.
     #[must_use]
     pub fn averaged(&self, factor: u32) -> Self {
-        let steps = linear_steps();
+        let (steps, table, bounds) = (linear_steps(), encode_table(), encode_bounds());
         let [width, height] = [self.width / factor, self.height / factor];
-        let samples = |x: u32, y: u32| {
-            let at = move |dx, dy| (y * factor + dy) as usize * self.width as usize + (x * factor + dx) as usize;
-            (0..factor).flat_map(move |dy| (0..factor).map(move |dx| self.pixels[at(dx, dy)]))
+        let per_mean = (factor * factor) as f32;
+        let (factor, all_columns) = (factor as usize, self.width as usize);
+        let mean = |rows: &[[u8; 4]], x: usize| {
+            let (mut sum, mut alpha) = ([0f32; 3], 0f32);
+            for &[r, g, b, a] in rows.chunks(all_columns).flat_map(|row| &row[x * factor..][..factor]) {
+                let weight = f32::from(a);
+                alpha += weight;
+                sum[0] += steps[usize::from(r)] * weight;
+                sum[1] += steps[usize::from(g)] * weight;
+                sum[2] += steps[usize::from(b)] * weight;
+            }
+            let [r, g, b] = sum.map(|sum| if alpha > 0.0 { nearest(table, bounds, sum / alpha) } else { 0 });
+            [r, g, b, (alpha / per_mean + 0.5) as u8]
         };
-        let mean = |x, y| {
-            let alpha: f32 = samples(x, y).map(|pixel| f32::from(pixel[3])).sum();
-            let sum =
-                |i: usize| samples(x, y).map(|pixel| steps[usize::from(pixel[i])] * f32::from(pixel[3])).sum::<f32>();
-            let channel = |i: usize| if alpha > 0.0 { (srgb(sum(i) / alpha) * 255.0).round() as u8 } else { 0 };
-            [channel(0), channel(1), channel(2), (alpha / (factor * factor) as f32).round() as u8]
-        };
-        let row = |y: u32| (0..width).map(move |x| mean(x, y));
-        let pixels = (0..height).into_par_iter().flat_map_iter(row).collect();
+        let mut pixels = bytemuck::zeroed_vec(width as usize * height as usize);
+        let rows = pixels.par_chunks_mut(width.max(1) as usize).zip(self.pixels.par_chunks(factor * all_columns));
+        rows.for_each(|(out, rows)| out.iter_mut().enumerate().for_each(|(x, out)| *out = mean(rows, x)));
         Self { width, height, pixels, linear: Vec::new() }
     }
 }

@@ -1,5 +1,7 @@
 //! Shading on the CPU, row by row.
 
+use std::ops::Range;
+
 use autosplats_cloud::ValueOrigin;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -13,6 +15,7 @@ use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
 use super::{ColorMode, Image, Shading, legend, linear, linear_steps};
 use crate::camera::View;
 use crate::cancel::Cancel;
+use crate::room::fit;
 use crate::splat::GBuffer;
 
 /// Shares of light and of colour left on the backs of surfaces.
@@ -22,6 +25,9 @@ pub(super) const BACK_COLOR: f32 = 0.4;
 pub(super) const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 /// Least rows that a thread shades at a time; occlusion that reaches further raises the number.
 const BAND_ROWS: usize = 32;
+/// Columns that a thread shades at a time: its buffers stay in its cache. With a pixel on either side they are whole
+/// vectors.
+const PIECE_COLUMNS: usize = 16 * LANES - 2;
 /// Largest number of pixels sampled to find the usual range of values.
 const RANGE_SAMPLES: usize = 50_000;
 /// Steps of `f32` or of the field's type that rounding and averaging may be off by.
@@ -106,9 +112,8 @@ pub(crate) fn shade(
     let [width, height] = [layers.width as usize, layers.height as usize];
     image.width = layers.width;
     image.height = layers.height;
-    image.pixels.resize(width * height, [0; 4]);
-    image.linear.clear();
-    image.linear.resize(if keep_linear { width * height } else { 0 }, [0.0; 3]);
+    fit(&mut image.pixels, width * height);
+    fit(&mut image.linear, if keep_linear { width * height } else { 0 });
     let shader = Shader::new(layers, scene, shading);
     let inks = &SrgbTables { table: encode_table(), linear: linear_steps() };
     let rows = BAND_ROWS.max(reach(&shader.pairs));
@@ -167,11 +172,12 @@ fn mix(a: [f32; 3], b: [f32; 3], part: f32) -> [f32; 3] {
     std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
 }
 
-/// Buffers to shade a band of rows, kept from one band to the next.
+/// Buffers to shade a band of rows piece by piece, kept from one band to the next.
 #[derive(Default)]
 struct Band {
+    /// Depths of the piece and of a pixel on every side.
     depths: Depths,
-    /// Light left by occlusion, from the row above the first to the row below the last; 0 to 1.
+    /// Light left by occlusion in the piece and a pixel on every side; 0 to 1.
     left: Vec<f32>,
     edges: Vec<bool>,
 }
@@ -186,31 +192,55 @@ impl Band {
         pixels: &mut [[u8; 4]],
         linear: &mut [[f32; 3]],
     ) {
+        let width = shader.layers.width as usize;
+        for column in (0..width).step_by(PIECE_COLUMNS) {
+            let columns = column..width.min(column + PIECE_COLUMNS);
+            self.shade_piece(shader, inks, columns, first, pixels, linear);
+        }
+    }
+
+    /// Shades these columns of the band.
+    fn shade_piece(
+        &mut self,
+        shader: &Shader<'_>,
+        inks: &SrgbTables,
+        columns: Range<usize>,
+        first: usize,
+        pixels: &mut [[u8; 4]],
+        linear: &mut [[f32; 3]],
+    ) {
         let Self { depths, left, edges } = self;
         let layers = shader.layers;
         let [width, height] = [layers.width as usize, layers.height as usize];
-        let rows = pixels.len() / width;
-        depths.fill(layers, first, rows, reach(&shader.pairs).max(EDGE_SEARCH_PX as usize) + 1);
-        let stride = width.next_multiple_of(LANES);
+        let rows = first..first + pixels.len() / width;
+        let background = |y: usize| background(shader.shading.background, (y as f32 + 0.5) / height as f32);
+        let out = rows.clone().zip(pixels.chunks_mut(width)).map(|(y, row)| (y, &mut row[columns.clone()]));
+        let around = [&columns, &rows].map(|range| range.start as isize - 1..range.end as isize + 1);
+        if !layers.is_drawn(around.clone()) {
+            out.for_each(|(y, row)| row.fill(background(y)));
+            linear.chunks_mut(width).for_each(|row| row[columns.clone()].fill([0.0; 3]));
+            return;
+        }
+        depths.fill(layers, around.clone(), reach(&shader.pairs).max(EDGE_SEARCH_PX as usize) + 1);
+        let stride = around[0].len().next_multiple_of(LANES);
         left.clear();
-        left.resize(stride * (rows + 2), 1.0);
+        left.resize(stride * around[1].len(), 1.0);
         let darkening = darkening(shader.shading, shader.colored);
         if darkening > 0.0 {
-            for (row, left) in left.chunks_mut(stride).enumerate() {
-                light_left(depths, (first + row) as isize - 1, &shader.pairs, shader.scene.view, darkening, left);
+            for (y, left) in around[1].clone().zip(left.chunks_mut(stride)) {
+                light_left(depths, y, &shader.pairs, shader.scene.view, darkening, left);
             }
         }
-        let left = |x: usize, y: usize| left[(y + 1 - first) * stride + x];
-        edges.resize(width, false);
-        for (row, out) in pixels.chunks_mut(width).enumerate() {
-            let y = first + row;
-            let background = background(shader.shading.background, (y as f32 + 0.5) / height as f32);
+        let left = |x: usize, y: usize| left[(y + 1 - rows.start) * stride + x + 1 - columns.start];
+        edges.resize(around[0].len(), false);
+        for (y, out) in out {
+            let background = background(y);
             shader.edges.mark(depths, y as isize, edges);
-            for (x, (out, &edge)) in out.iter_mut().zip(&*edges).enumerate() {
+            for ((x, out), &edge) in columns.clone().zip(out).zip(&edges[1..]) {
                 let color = shader.pixel(depths, x, y, left(x, y), edge);
                 *out = color.map_or(background, |color| inks.encode(color));
-                if let (Some(color), Some(linear)) = (color, linear.get_mut(row * width + x)) {
-                    *linear = color;
+                if let Some(linear) = linear.get_mut((y - rows.start) * width + x) {
+                    *linear = color.unwrap_or_default();
                 }
                 if !edge {
                     continue;

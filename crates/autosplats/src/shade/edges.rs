@@ -175,7 +175,7 @@ mod tests {
             layers.depth[at] = of(x as f32 + 0.5, y as f32 + 0.5);
         }
         let mut depths = Depths::default();
-        depths.fill(&layers, 0, SIZE, EDGE_SEARCH_PX as usize + 1);
+        depths.fill(&layers, [0..SIZE as isize, 0..SIZE as isize], EDGE_SEARCH_PX as usize + 1);
         depths
     }
 

@@ -35,3 +35,50 @@ pub(super) fn encode_table() -> &'static [u8] {
     });
     &TABLE
 }
+
+/// Least linear value of each 8-bit sRGB channel, then infinity.
+pub(super) fn encode_bounds() -> &'static [f32; 257] {
+    static BOUNDS: LazyLock<[f32; 257]> = LazyLock::new(|| {
+        let mut bounds = std::array::from_fn(least_with);
+        bounds[256] = f32::INFINITY;
+        bounds
+    });
+    &BOUNDS
+}
+
+/// Least linear value from 0 to 1 whose nearest channel is not below this one.
+fn least_with(channel: usize) -> f32 {
+    // The bits of positive floats order like the floats.
+    let [mut low, mut high] = [0.0f32, 1.0].map(f32::to_bits);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if (srgb(f32::from_bits(middle)) * 255.0).round() < channel as f32 { low = middle + 1 } else { high = middle }
+    }
+    f32::from_bits(low)
+}
+
+/// The 8-bit sRGB channel nearest to a linear one from 0 to 1; [`encode`] may be off by one.
+pub(super) fn nearest(table: &[u8], bounds: &[f32; 257], channel: f32) -> u8 {
+    let near = encode(table, channel);
+    let [own, next] = [0, 1].map(|more| bounds[usize::from(near) + more]);
+    near + u8::from(channel >= next) - u8::from(channel < own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_channel_is_that_of_the_formula() {
+        let (table, bounds) = (encode_table(), encode_bounds());
+        let [mut all, mut missed] = [0; 2];
+        // A prime step, so that numbers of all kinds are met.
+        for channel in (0..=1.0f32.to_bits()).step_by(10_007).map(f32::from_bits).chain([1.0, 1.0 + f32::EPSILON]) {
+            let exact = (srgb(channel) * 255.0).round() as u8;
+            assert_eq!(nearest(table, bounds, channel), exact, "{channel}");
+            missed += usize::from(encode(table, channel) != exact);
+            all += 1;
+        }
+        assert!(missed > 100 && all > 100_000, "the table alone misses {missed} of {all}");
+    }
+}

@@ -148,7 +148,7 @@ mod tests {
         // The pairs of a picture 900 pixels high.
         let pairs = pairs(PATTERN_HEIGHT_PX as u32);
         let mut depths = Depths::default();
-        depths.fill(&layers, 0, SIZE, reach(&pairs) + 1);
+        depths.fill(&layers, [0..SIZE as isize, 0..SIZE as isize], reach(&pairs) + 1);
         let mut left = vec![f32::NAN; SIZE.next_multiple_of(LANES)];
         light_left(&depths, MIDDLE as isize, &pairs, &view, DARKENING[0], &mut left);
         left.truncate(SIZE);

@@ -76,6 +76,12 @@ impl Run {
         &self.entries[self.start[bin] as usize..self.start[bin + 1] as usize]
     }
 
+    /// The tiles that splats may touch, ascending.
+    pub(super) fn tiles(&self) -> impl Iterator<Item = usize> {
+        let is_touched = |&tile: &usize| !self.tile(tile).is_empty();
+        (self.first_tile..self.first_tile + self.start.len().saturating_sub(1)).filter(is_touched)
+    }
+
     /// The splats to draw into `tile`, ascending.
     pub(super) fn living(&self, tile: usize) -> impl Iterator<Item = usize> {
         self.tile(tile).iter().map(|&index| index as usize).filter(|&index| self.alive[index])

@@ -9,12 +9,13 @@ use super::raster::{Tile, draw_attributes, draw_depth};
 use super::setup::RECOVER_DISTANCE_RADII;
 use super::trim::blurred::BlurredBorders;
 use super::trim::{EMPTY, Outline, Rim, TrimRules, rim};
-use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
+use super::{GBuffer, TILE, TILE_AREA, Tiles};
 use crate::adapt::Noise;
 use crate::camera::View;
 use crate::cancel::Cancel;
 use crate::fit::Surfel;
 use crate::project::Sixteenths;
+use crate::room::fit;
 
 /// Surfels in a run.
 const RUN: usize = 16 * 1024;
@@ -25,23 +26,20 @@ pub(crate) struct Splatter {
     runs: Vec<Run>,
     /// Runs in use this frame.
     used: usize,
+    tiles: Tiles,
     /// Depth per pixel, pushed back by ε, tile by tile.
     depth: Vec<f32>,
-    /// The depth map before the last refinement.
-    previous: Vec<f32>,
     /// State of pixels for trimming, tile by tile.
     rims: Vec<Rim>,
     centers: Vec<u32>,
     layers: GBuffer,
-    /// Tiles in which layers, rims and centres are known to be empty.
-    empty: Vec<bool>,
 }
 
 impl Splatter {
-    /// Forgets the last frame and clears the depth map.
+    /// Forgets the last frame's depth map.
     pub(crate) fn begin(&mut self, view: &View) {
         self.used = 0;
-        clear(&mut self.depth, view);
+        self.tiles.clear([view.width as usize, view.height as usize]);
     }
 
     /// The layers: those of the last frame until the attributes of this frame are drawn.
@@ -63,14 +61,27 @@ impl Splatter {
                 run.set_up(first + index * RUN, surfels, view);
             }
         });
-        draw_depth_map(runs, view, &mut self.depth, cancel);
+        if cancel.is_given_up() {
+            // Runs may be those of another frame.
+            return;
+        }
+        let Self { tiles, depth, .. } = self;
+        // Tiles that the round before has drawn stay.
+        let fresh = if before > 0 { tiles.stored().len() } else { 0 };
+        runs.iter().flat_map(|run| run.tiles()).for_each(|tile| tiles.store(tile));
+        if before > 0 {
+            depth.resize(tiles.area(), f32::INFINITY);
+        } else {
+            fit(depth, tiles.area());
+        }
+        draw_depth_map(runs, tiles, fresh, view, depth, cancel);
     }
 
     /// Whether the depth map hides a point at this pixel and depth, and will do so however silhouettes change.
     /// `initial_radius_px` is the point's first search radius.
     pub(crate) fn hides(&self, [x, y]: [usize; 2], depth: f32, initial_radius_px: f32, view: &View) -> bool {
         let [width, height] = [view.width as usize, view.height as usize];
-        let hidden = |x: usize, y: usize| depth > self.depth[tiled_index(width, x, y)];
+        let hidden = |x: usize, y: usize| depth > self.depth[self.tiles.index([x, y])];
         let reach = (RECOVER_DISTANCE_RADII * initial_radius_px) as usize;
         hidden(x, y)
             && hidden(x.saturating_sub(reach), y)
@@ -82,19 +93,17 @@ impl Splatter {
     /// Refinement: redraws the depth map with only those surfels whose point it does not hide [Paper, §7, Depth
     /// Refinement].
     pub(crate) fn refine(&mut self, surfels: &[Surfel], view: &View, cancel: &Cancel<'_>) {
-        std::mem::swap(&mut self.depth, &mut self.previous);
-        clear(&mut self.depth, view);
-        let runs = &mut self.runs[..self.used];
-        let depth = &self.previous;
+        let Self { runs, used, tiles, depth, .. } = self;
+        let runs = &mut runs[..*used];
         runs.par_iter_mut().for_each(|run| {
             let splats = run.splats.iter().zip(&surfels[run.first..]);
             for (alive, (splat, surfel)) in run.alive.iter_mut().zip(splats) {
                 let [x, y] = surfel.pixel_xy();
-                let hidden = surfel.center[2] > depth[tiled_index(view.width as usize, x, y)];
+                let hidden = surfel.center[2] > depth[tiles.index([x, y])];
                 *alive = !splat.covers_nothing() & !hidden;
             }
         });
-        draw_depth_map(runs, view, &mut self.depth, cancel);
+        draw_depth_map(runs, tiles, 0, view, depth, cancel);
     }
 
     /// Attribute pass: the weighted mean of all living surfels within ε of the depth map [Paper, §7].
@@ -105,35 +114,22 @@ impl Splatter {
         attributes: &Attributes<'_>,
         cancel: &Cancel<'_>,
     ) -> &GBuffer {
-        let Self { runs, used, depth, rims, centers, layers, empty, .. } = self;
-        if !layers.resize(view, depth.len(), attributes.optional()) {
-            empty.clear();
-        }
+        let Self { runs, used, tiles, depth, rims, centers, layers } = self;
+        layers.resize(view, tiles, attributes.optional());
         layers.scalar_about = attributes.scalar.map(|values| values.about()).unwrap_or_default();
-        rims.resize(depth.len(), 0.0);
-        centers.resize(depth.len(), 0);
-        empty.resize(depth.len() / TILE_AREA, false);
-        let known = rims.par_chunks_mut(TILE_AREA).zip(centers.par_chunks_mut(TILE_AREA)).zip(empty);
-        let tiles = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).zip(known);
-        tiles.enumerate().for_each_init(TileSums::default, |sums, (index, ((mut layers, depth), known))| {
-            let ((rims, centers), empty) = known;
-            if runs[..*used].iter().all(|run| run.tile(index).is_empty()) {
-                // A large part of many pictures is empty, often the same as in the last frame.
-                if !std::mem::replace(empty, true) {
-                    layers.clear_all();
-                    rims.fill(EMPTY);
-                    centers.fill(0);
-                }
-                return;
-            }
-            *empty = false;
+        fit(rims, depth.len());
+        fit(centers, depth.len());
+        let states = rims.par_chunks_mut(TILE_AREA).zip(centers.par_chunks_mut(TILE_AREA));
+        let stored = layers.cut().into_par_iter().zip(depth.par_chunks(TILE_AREA)).zip(states).zip(tiles.stored());
+        stored.for_each_init(TileSums::default, |sums, (((mut layers, depth), (rims, centers)), &index)| {
+            let tile = Tile { index, origin: tiles.origin(index) };
             sums.clear(attributes);
-            add_centers(&runs[..*used], surfels, tile(index, view), centers);
+            add_centers(&runs[..*used], surfels, tile, centers);
             for run in runs[..*used].iter().filter(|run| !run.tile(index).is_empty()) {
                 if cancel.is_given_up() {
                     return;
                 }
-                draw_attributes(run, surfels, tile(index, view), view, depth, attributes, sums);
+                draw_attributes(run, surfels, tile, view, depth, attributes, sums);
             }
             sums.normalize(attributes, &mut layers);
             let TileSums { weight, heaviest, reach, .. } = sums;
@@ -157,15 +153,15 @@ impl Splatter {
         if cancel.is_given_up() {
             return 0;
         }
-        let Self { rims, centers, layers, .. } = self;
-        let blurred = BlurredBorders::new(noise, k_radius_per_radius, rims, sixteenths, view);
-        let outline = Outline { rims, centers, sixteenths, view, blurred: blurred.as_ref() };
-        let tiles = layers.tiles().into_par_iter().enumerate();
-        let covered = tiles.map(|(index, mut layers)| {
-            let [x0, y0] = tile(index, view).origin;
-            if rims[index * TILE_AREA..][..TILE_AREA].iter().all(|&rim| rim == EMPTY) || cancel.is_given_up() {
+        let Self { tiles, rims, centers, layers, .. } = self;
+        let blurred = BlurredBorders::new(noise, k_radius_per_radius, (rims, tiles), sixteenths, view);
+        let outline = Outline { rims, centers, sixteenths, tiles, view, blurred: blurred.as_ref() };
+        let drawn = layers.cut().into_par_iter().zip(tiles.stored()).zip(rims.par_chunks(TILE_AREA));
+        let covered = drawn.map(|((mut layers, &tile), own)| {
+            if own.iter().all(|&rim| rim == EMPTY) || cancel.is_given_up() {
                 return 0;
             }
+            let [x0, y0] = tiles.origin(tile);
             let edges = outline.edges([x0, y0]);
             let mut covered = 0;
             for y in y0..(y0 + TILE).min(view.height as usize) {
@@ -191,30 +187,17 @@ impl Splatter {
     }
 }
 
-/// Sizes a depth map for `view` and fills it with infinity.
-fn clear(depth: &mut Vec<f32>, view: &View) {
-    let tiles = tile_columns(view.width as usize) * tile_columns(view.height as usize);
-    depth.resize(tiles * TILE_AREA, f32::INFINITY);
-    depth.par_chunks_mut(TILE_AREA).for_each(|tile| tile.fill(f32::INFINITY));
-}
-
-fn tile(index: usize, view: &View) -> Tile {
-    let columns = tile_columns(view.width as usize);
-    Tile { index, origin: [index % columns * TILE, index / columns * TILE] }
-}
-
-/// Draws the depth of all living splats of `runs`, tile by tile.
-fn draw_depth_map(runs: &[Run], view: &View, depth: &mut [f32], cancel: &Cancel<'_>) {
-    if cancel.is_given_up() {
-        // Runs may be those of another frame.
-        return;
-    }
-    depth.par_chunks_mut(TILE_AREA).enumerate().for_each(|(index, depth)| {
+/// Draws the depth of all living splats of `runs`, tile by tile. Tiles are cleared first from the place `fresh` on.
+fn draw_depth_map(runs: &[Run], tiles: &Tiles, fresh: usize, view: &View, depth: &mut [f32], cancel: &Cancel<'_>) {
+    depth.par_chunks_mut(TILE_AREA).zip(tiles.stored()).enumerate().for_each(|(place, (depth, &index))| {
+        if place >= fresh {
+            depth.fill(f32::INFINITY);
+        }
         for run in runs.iter().filter(|run| !run.tile(index).is_empty()) {
             if cancel.is_given_up() {
                 return;
             }
-            draw_depth(run, tile(index, view), view, depth);
+            draw_depth(run, Tile { index, origin: tiles.origin(index) }, view, depth);
         }
     });
 }

@@ -2,10 +2,11 @@
 
 use autosplats_cloud::ValueOrigin;
 
-use super::{GBuffer, TILE_AREA, tile_columns, tiled_index};
+use super::{GBuffer, TILE_AREA, Tiles};
 use crate::Error;
 use crate::camera::View;
 use crate::gpu::Gpu;
+use crate::room::fit;
 
 /// Optional attributes that splats carry beside depth and normal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,19 +60,6 @@ impl TileLayers<'_> {
         PixelSurface { depth: self.depth[at], normal: self.normal[at] }
     }
 
-    /// Empties the tile.
-    pub(super) fn clear_all(&mut self) {
-        self.weight.fill(0.0);
-        self.depth.fill(f32::INFINITY);
-        self.normal.fill([0.0; 3]);
-        self.point.fill(u32::MAX);
-        self.color.fill([0.0; 3]);
-        self.scalar.fill(f32::NAN);
-        for measure in [&mut self.radius, &mut self.k_radius, &mut self.curvature, &mut self.back] {
-            measure.fill(0.0);
-        }
-    }
-
     /// Empties pixel `at` of the tile.
     pub(super) fn clear(&mut self, at: usize) {
         self.weight[at] = 0.0;
@@ -93,34 +81,27 @@ impl TileLayers<'_> {
 }
 
 impl GBuffer {
-    /// Sizes the layers for a frame. Returns whether all lengths are unchanged, so that the layers still hold the last
-    /// frame.
-    pub(super) fn resize(&mut self, view: &View, area: usize, channels: Channels) -> bool {
-        fn fit<T: Copy + Default>(layer: &mut Vec<T>, len: usize) -> bool {
-            let fits = layer.len() == len;
-            layer.resize(len, T::default());
-            fits
-        }
+    /// Sizes the layers for a frame that is drawn in these tiles. Values are undefined.
+    pub(super) fn resize(&mut self, view: &View, tiles: &Tiles, channels: Channels) {
+        self.tiles.clone_from(tiles);
+        let area = self.area();
         let wanted = |wanted: bool| if wanted { area } else { 0 };
         [self.width, self.height] = view.picture_size();
         self.margin = view.margin;
-        let fits = [
-            fit(&mut self.weight, area),
-            fit(&mut self.depth, area),
-            fit(&mut self.normal, area),
-            fit(&mut self.point, area),
-            fit(&mut self.color, wanted(channels.color)),
-            fit(&mut self.scalar, wanted(channels.scalar)),
-            fit(&mut self.radius, wanted(channels.measures)),
-            fit(&mut self.k_radius, wanted(channels.measures)),
-            fit(&mut self.curvature, wanted(channels.measures)),
-            fit(&mut self.back, wanted(channels.backs)),
-        ];
-        fits == [true; 10]
+        fit(&mut self.weight, area);
+        fit(&mut self.depth, area);
+        fit(&mut self.normal, area);
+        fit(&mut self.point, area);
+        fit(&mut self.color, wanted(channels.color));
+        fit(&mut self.scalar, wanted(channels.scalar));
+        fit(&mut self.radius, wanted(channels.measures));
+        fit(&mut self.k_radius, wanted(channels.measures));
+        fit(&mut self.curvature, wanted(channels.measures));
+        fit(&mut self.back, wanted(channels.backs));
     }
 
-    /// Cuts all layers into tiles.
-    pub(super) fn tiles(&mut self) -> Vec<TileLayers<'_>> {
+    /// Cuts all layers into their tiles.
+    pub(super) fn cut(&mut self) -> Vec<TileLayers<'_>> {
         fn cut<'a, T>(rest: &mut &'a mut [T]) -> &'a mut [T] {
             rest.split_off_mut(..TILE_AREA).unwrap_or_default()
         }
@@ -203,7 +184,8 @@ impl LayerBuffers {
     pub(crate) fn to_host(&self, margin: u32, surface: &[u8], cover: &[u8], extras: &[u8]) -> GBuffer {
         let [width, height] = self.size.map(|side| side as usize);
         let Channels { color, scalar, measures, backs } = self.channels;
-        let area = tile_columns(width) * tile_columns(height) * TILE_AREA;
+        let tiles = Tiles::all([width, height]);
+        let area = tiles.area();
         let wanted = |wanted: bool| if wanted { area } else { 0 };
         let mut layers = GBuffer {
             width: self.size[0] - 2 * margin,
@@ -220,6 +202,7 @@ impl LayerBuffers {
             curvature: vec![0.0; wanted(measures)],
             back: vec![0.0; wanted(backs)],
             margin,
+            tiles,
         };
         let surface: &[[f32; 4]] = bytemuck::cast_slice(surface);
         let cover: &[Cover] = bytemuck::cast_slice(cover);
@@ -227,7 +210,7 @@ impl LayerBuffers {
         let pixels = width * height;
         let (colors, measured) = extras.split_at(if color { pixels } else { 0 });
         for (pixel, (&[x, y, z, depth], cover)) in surface[..pixels].iter().zip(cover).enumerate() {
-            let at = tiled_index(width, pixel % width, pixel / width);
+            let at = layers.tiles.index([pixel % width, pixel / width]);
             layers.weight[at] = cover.weight;
             layers.depth[at] = depth;
             layers.normal[at] = [x, y, z];

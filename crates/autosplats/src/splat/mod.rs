@@ -23,7 +23,10 @@ mod rows;
 mod setup;
 #[cfg(test)]
 mod tests;
+mod tiles;
 mod trim;
+
+use std::ops::Range;
 
 use autosplats_cloud::ValueOrigin;
 
@@ -33,6 +36,7 @@ pub(crate) use layers::{Channels, LayerBuffers};
 #[cfg(test)]
 pub(crate) use layers::{Cover, upload_layers};
 pub(crate) use over_time::{OverTime, STEADY_FRAMES};
+pub(crate) use tiles::Tiles;
 pub(crate) use trim::TrimRules;
 
 /// Side of a screen tile in pixels: the unit of splatting, and the layout of every screen-sized layer.
@@ -43,8 +47,9 @@ pub(crate) const TILE_AREA: usize = TILE * TILE;
 /// The visible surface, a value per pixel and layer.
 ///
 /// Layers are stored tile by tile, [`TILE`]×[`TILE`] pixels each, so that a tile is one piece of cache and of work.
-/// [`index`](Self::index) finds a pixel of the picture. Layers may have a margin around the picture, whose pixels may
-/// be covered too. A layer that was not requested is empty.
+/// [`index`](Self::index) finds a pixel of the picture. A frame's tiles without any splat share one piece, so change only
+/// layers from [`new`](Self::new). Layers may have a margin around the picture, whose pixels may be covered too. A layer
+/// that was not requested is empty.
 ///
 /// # Examples
 ///
@@ -100,12 +105,14 @@ pub struct GBuffer {
     pub back: Vec<f32>,
     /// Width in pixels of the margin that layers have on every side of the picture.
     pub(crate) margin: u32,
+    pub(crate) tiles: Tiles,
 }
 
 impl GBuffer {
     /// Layers of a picture without any surface. Optional layers are empty.
     pub fn new(width: u32, height: u32) -> Self {
-        let mut layers = Self { width, height, ..Self::default() };
+        let tiles = Tiles::all([width, height].map(|side| side as usize));
+        let mut layers = Self { width, height, tiles, ..Self::default() };
         let area = layers.area();
         layers.weight = vec![0.0; area];
         layers.depth = vec![f32::INFINITY; area];
@@ -116,15 +123,24 @@ impl GBuffer {
 
     /// Number of values in a layer that is not empty.
     pub(crate) fn area(&self) -> usize {
-        let [columns, rows] = [self.width, self.height].map(|side| tile_columns((side + 2 * self.margin) as usize));
-        columns * rows * TILE_AREA
+        self.tiles.area()
     }
 
     /// Index of pixel (x, y) in each layer.
     #[inline(always)]
     pub fn index(&self, x: usize, y: usize) -> usize {
         let margin = self.margin as usize;
-        tiled_index(self.width as usize + 2 * margin, x + margin, y + margin)
+        self.tiles.index([x + margin, y + margin])
+    }
+
+    /// Whether a splat touches any tile in these columns and rows of the picture, beyond which they may reach.
+    pub(crate) fn is_drawn(&self, [columns, rows]: [Range<isize>; 2]) -> bool {
+        let margin = self.margin as isize;
+        let on_screen = |range: Range<isize>, side: u32| {
+            let [first, end] = [range.start, range.end].map(|at| (at + margin).clamp(0, side as isize + 2 * margin));
+            first as usize..end as usize
+        };
+        self.tiles.any_stored([on_screen(columns, self.width), on_screen(rows, self.height)])
     }
 
     /// Number of pixels from column `x` to the end of its tile, which lie side by side in memory. The row may end
@@ -137,10 +153,4 @@ impl GBuffer {
 /// Number of tiles in a row of a screen `width` pixels wide.
 pub(crate) const fn tile_columns(width: usize) -> usize {
     width.div_ceil(TILE)
-}
-
-/// Index of pixel (x, y) of a screen `width` pixels wide in a layer stored tile by tile.
-#[inline(always)]
-pub(crate) const fn tiled_index(width: usize, x: usize, y: usize) -> usize {
-    (y / TILE * tile_columns(width) + x / TILE) * TILE_AREA + (y % TILE) * TILE + x % TILE
 }

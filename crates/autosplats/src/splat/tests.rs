@@ -5,7 +5,7 @@ use autosplats_cloud::{FieldValues, RelativeValues};
 use glam::Vec3;
 
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, MIN_FACING_COSINE};
-use super::{Attributes, GBuffer, PointColors, Splatter};
+use super::{Attributes, GBuffer, PointColors, Splatter, TILE, TILE_AREA};
 use crate::camera::{Camera, Projection, View};
 use crate::fit::{SUPPORT, Surfel};
 use crate::project::{ScreenPoint, Sixteenths};
@@ -418,6 +418,20 @@ fn any_number_of_threads_gives_the_same_bits() {
     for threads in [2, 5] {
         assert!(drawn(threads) == one, "{threads} threads give another picture than one");
     }
+}
+
+#[test]
+fn layers_are_as_large_as_what_is_drawn() {
+    let view = views([1000, 700])[0];
+    let mut surfels = surfels(37, 3000, Discs::Circles, &view);
+    surfels.retain(|surfel| surfel.pixel_xy().iter().all(|&at| at < 2 * TILE));
+    let layers = draw(&surfels, &view, 1, &Data::new(3000));
+    let covered = (0..1000 * 700).filter(|at| layers.weight[layers.index(at % 1000, at / 1000)] > 0.0).count();
+    let stored = layers.weight.len();
+    assert!((1000..20 * TILE_AREA).contains(&stored), "{covered} pixels are covered, {stored} stored");
+    assert!(covered > 1000 && covered < stored, "{covered} pixels are covered, {stored} stored");
+    let far = layers.index(999, 699);
+    assert_eq!((layers.weight[far], layers.depth[far], layers.point[far]), (0.0, f32::INFINITY, u32::MAX), "empty");
 }
 
 #[test]

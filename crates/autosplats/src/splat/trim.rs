@@ -29,7 +29,7 @@ mod tests;
 use self::blurred::BlurredBorders;
 use super::centers::mean;
 use super::layers::PixelSurface;
-use super::{TILE, TILE_AREA, tiled_index};
+use super::{TILE, TILE_AREA, Tiles};
 use crate::camera::View;
 use crate::project::Sixteenths;
 
@@ -170,6 +170,7 @@ pub(super) struct Outline<'a> {
     /// Centres of splats per pixel (`centers`).
     pub(super) centers: &'a [u32],
     pub(super) sixteenths: &'a Sixteenths,
+    pub(super) tiles: &'a Tiles,
     pub(super) view: &'a View,
     /// State of borders that noise has blurred; `None` without noise.
     pub(super) blurred: Option<&'a BlurredBorders>,
@@ -180,8 +181,8 @@ impl Outline<'_> {
         [self.view.width as usize, self.view.height as usize]
     }
 
-    fn index(&self, [x, y]: [usize; 2]) -> usize {
-        tiled_index(self.view.width as usize, x, y)
+    fn index(&self, pixel: [usize; 2]) -> usize {
+        self.tiles.index(pixel)
     }
 
     /// Masks of emptiness for the tile whose upper left pixel is (x0, y0).

@@ -35,7 +35,8 @@ pub(in crate::adapt) enum Blend {
 const FIELDS: usize = 19;
 
 /// The sheets of a cell, one array per number for SIMD. All numbers are 0 where there is no sheet.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, bytemuck::Zeroable)]
+#[repr(transparent)]
 pub(super) struct CellSheets(pub(super) [[f32; SHEETS]; FIELDS]);
 
 impl CellSheets {

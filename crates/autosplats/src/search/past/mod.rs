@@ -15,7 +15,8 @@ use rayon::prelude::*;
 
 use super::{LANES, Neighborhoods};
 use crate::camera::{PlacedView, Reprojection};
-use crate::project::ScreenPoints;
+use crate::project::{Blocks, ScreenPoints};
+use crate::room::fit_atomic;
 
 /// Factor on a k-radius of the last frame to start a search from: neighbours change, and pixels hold other points.
 pub(crate) const PAST_RADIUS_SLACK: f32 = 1.05;
@@ -26,8 +27,6 @@ pub(crate) const PAST_FIRST_RADII_RANGE: [f32; 2] = [0.1, 4.0];
 const MAX_TRUSTED_SHORTFALL: f32 = 1.2;
 /// While the last frame's radii are not trusted, one block in this many still reads them, to notice a change.
 const UNTRUSTED_CHECK_BLOCKS: u32 = 8;
-/// Values that a task clears.
-const CHUNK: usize = 1 << 16;
 
 /// Trust in the last frame's radii, learnt from block to block. The radii are right where nothing moved, and no better
 /// than any guess where points are new.
@@ -80,6 +79,8 @@ struct PastRadii {
     seen: Option<(PlacedView, u32)>,
     /// Bits of the greatest k-radius per pixel; 0 where no point has k neighbours.
     pixels: Vec<AtomicU32>,
+    /// The blocks of pixels that may have radii.
+    blocks: Blocks,
 }
 
 impl Past {
@@ -87,10 +88,11 @@ impl Past {
     pub(crate) fn begin(&mut self, now: PlacedView, k: u32) {
         let past = self.last.seen.filter(|&(_, known)| known == k);
         self.reprojection = past.and_then(|(past, _)| Reprojection::new(&now, &past));
-        let PastRadii { seen, pixels } = &mut self.next;
+        let PastRadii { seen, pixels, blocks } = &mut self.next;
         *seen = Some((now, k));
-        pixels.resize_with(now.view.width as usize * now.view.height as usize, AtomicU32::default);
-        pixels.par_chunks_mut(CHUNK).for_each(|chunk| chunk.iter_mut().for_each(|radius| *radius.get_mut() = 0));
+        // A frame that is given up before it keeps radii has none.
+        std::mem::take(blocks).change(pixels, |pixels| pixels.iter_mut().for_each(|radius| *radius.get_mut() = 0));
+        fit_atomic(pixels, now.view.width as usize * now.view.height as usize);
     }
 
     /// Ends a frame, whose radii become the past of the next.
@@ -114,15 +116,17 @@ impl Past {
     }
 
     /// Stores the k-radii of `queries` that found k neighbours.
-    pub(crate) fn keep(&self, screen: &ScreenPoints, queries: &[u32], neighborhoods: &Neighborhoods) {
-        let Some((PlacedView { view, .. }, k)) = self.next.seen else { return };
+    pub(crate) fn keep(&mut self, screen: &ScreenPoints, queries: &[u32], neighborhoods: &Neighborhoods) {
+        let PastRadii { seen: Some((PlacedView { view, .. }, k)), pixels, blocks } = &mut self.next else { return };
+        blocks.clone_from(screen.sixteenths.blocks());
+        let pixels = &*pixels;
         queries.par_chunks(LANES).zip(&neighborhoods.blocks).with_min_len(64).for_each(|(queries, block)| {
             for (lane, &query) in queries.iter().enumerate() {
                 let point = &screen.points[query as usize];
-                if block.count.0[lane] >= k as f32 && !point.is_near() {
+                if block.count.0[lane] >= *k as f32 && !point.is_near() {
                     let [x, y] = point.pixel_xy();
                     // The maximum picks the same one of a pixel's two points in every run.
-                    let pixel = &self.next.pixels[y * view.width as usize + x];
+                    let pixel = &pixels[y * view.width as usize + x];
                     pixel.fetch_max(block.k_radius.0[lane].to_bits(), Ordering::Relaxed);
                 }
             }

@@ -18,7 +18,8 @@ fn seen(view: &View) -> PlacedView {
 /// A past with these radii, seen by `view`.
 fn past(view: &View, k: u32, radii: &[f32]) -> Past {
     let pixels = radii.iter().map(|radius| AtomicU32::new(radius.to_bits())).collect();
-    let mut past = Past { last: PastRadii { seen: Some((seen(view), k)), pixels }, ..Past::default() };
+    let mut past =
+        Past { last: PastRadii { seen: Some((seen(view), k)), pixels, ..PastRadii::default() }, ..Past::default() };
     past.begin(seen(view), k);
     past
 }

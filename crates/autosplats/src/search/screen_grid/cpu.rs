@@ -10,6 +10,7 @@ use super::window::Window;
 use crate::camera::View;
 use crate::cancel::Cancel;
 use crate::project::ScreenPoints;
+use crate::room::fit;
 use crate::search::moments::{squared_distances, sum_moments};
 use crate::search::past::{Past, Trust};
 use crate::search::select::{CANDIDATE_GROUP, kth_smallest, largest_below};
@@ -39,7 +40,7 @@ pub(crate) fn search(
     neighborhoods: &mut Neighborhoods,
     cancel: &Cancel<'_>,
 ) {
-    neighborhoods.blocks.resize(queries.len().div_ceil(LANES), NeighborhoodBlock::default());
+    fit(&mut neighborhoods.blocks, queries.len().div_ceil(LANES));
     neighborhoods.counts = neighborhoods
         .blocks
         .par_chunks_mut(TASK_BLOCKS)

@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use crate::camera::{Reprojection, View};
 use crate::fit::Surfel;
-use crate::splat::{GBuffer, tiled_index};
+use crate::splat::GBuffer;
 
 /// Least cosine of the angle between the surfel's normal and that of the same surface in the last frame.
 pub(super) const MIN_SURFACE_COSINE: f32 = 0.7;
@@ -30,7 +30,7 @@ pub(super) fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) 
     let pixel = past.pixel(surfel.center)?;
     let width = past.view.width as usize;
     let [x, y] = [pixel % width, pixel / width];
-    let at = tiled_index(width, x, y);
+    let at = last.tiles.index([x, y]);
     if last.weight[at] == 0.0 {
         return None;
     }

@@ -32,9 +32,9 @@ use super::{EMPTY, Outline, Rim, SPLAT_WINDOW_PX};
 use crate::adapt::Noise;
 use crate::camera::View;
 use crate::fit::SUPPORT;
-use crate::project::Sixteenths;
+use crate::project::{OCCUPANCY_BLOCK_PX, Sixteenths};
 use crate::splat::layers::PixelSurface;
-use crate::splat::{TILE, tiled_index};
+use crate::splat::{TILE, Tiles};
 
 /// Least noise in pixels that blurs a border. With less noise, detail of far views that passes for noise would be cut.
 pub(in crate::splat) const MIN_BLURRING_NOISE_PX: f32 = 0.25;
@@ -119,7 +119,7 @@ impl BlurredBorders {
     pub(in crate::splat) fn new(
         noise: Noise,
         per_radius: f32,
-        rims: &[Rim],
+        (rims, tiles): (&[Rim], &Tiles),
         sixteenths: &Sixteenths,
         view: &View,
     ) -> Option<Self> {
@@ -127,9 +127,11 @@ impl BlurredBorders {
             return None;
         }
         let [width, height] = [view.width as usize, view.height as usize];
-        let pixels = SixteenthCounts::new([1, width, height], |x, y| sixteenths.of(y * width + x).count_ones() as u16);
-        let pairs = pixels.in_pairs();
-        let blocks = pairs.in_pairs();
+        let holds = |column: usize, row: usize| sixteenths.blocks().holds(column, row);
+        let count = |x: usize, y: usize| sixteenths.of(y * width + x).count_ones() as u16;
+        let pixels = SixteenthCounts::new([1, width, height], holds, count);
+        let pairs = pixels.in_pairs(holds);
+        let blocks = pairs.in_pairs(holds);
         let [columns, rows] = [blocks.columns, blocks.rows];
         // Most of the margin has no splats, although it may hold a surface.
         let goes_on = |[x, y]: [usize; 2]| {
@@ -144,7 +146,7 @@ impl BlurredBorders {
                 let (first, len) = (tile * TILE, TILE.min(width - tile * TILE));
                 let mut covered = [false; TILE];
                 for y in pixel_rows.clone() {
-                    let rims = &rims[tiled_index(width, first, y)..][..len];
+                    let rims = &rims[tiles.index([first, y])..][..len];
                     covered.iter_mut().zip(rims).for_each(|(covered, &rim)| *covered |= rim != EMPTY);
                 }
                 for (x, (to_empty, covered)) in to_empty.iter_mut().zip(covered.chunks(BLOCK_PX)).enumerate() {
@@ -293,18 +295,27 @@ impl Outline<'_> {
 }
 
 impl SixteenthCounts {
-    fn new([side, columns, rows]: [usize; 3], count: impl Fn(usize, usize) -> u16 + Sync) -> Self {
+    /// Counts in the blocks of the screen, by column and row, that hold points. The others stay zero, untouched.
+    fn new(
+        [side, columns, rows]: [usize; 3],
+        holds: impl Fn(usize, usize) -> bool + Sync,
+        count: impl Fn(usize, usize) -> u16 + Sync,
+    ) -> Self {
         let mut counts = vec![0; columns * rows + LANES];
+        let per_block = OCCUPANCY_BLOCK_PX / side;
         counts.par_chunks_mut(columns).take(rows).enumerate().for_each(|(y, row)| {
-            row.iter_mut().enumerate().for_each(|(x, held)| *held = count(x, y));
+            let blocks = row.chunks_mut(per_block).enumerate();
+            for (column, block) in blocks.filter(|&(column, _)| holds(column, y / per_block)) {
+                block.iter_mut().enumerate().for_each(|(x, held)| *held = count(column * per_block + x, y));
+            }
         });
         Self { side, columns, rows, count: counts }
     }
 
     /// The same counts in squares twice as wide.
-    fn in_pairs(&self) -> Self {
+    fn in_pairs(&self, holds: impl Fn(usize, usize) -> bool + Sync) -> Self {
         let size = [2 * self.side, self.columns.div_ceil(2), self.rows.div_ceil(2)];
-        Self::new(size, |x, y| {
+        Self::new(size, holds, |x, y| {
             let [columns, rows] = [(x, self.columns), (y, self.rows)].map(|(at, most)| 2 * at..(2 * at + 2).min(most));
             rows.flat_map(|y| &self.count[y * self.columns..][columns.clone()]).sum()
         })
@@ -422,8 +433,9 @@ mod tests {
                 counts[row * width + column] += 1;
             }
         }
-        let pixels = SixteenthCounts::new([1, width, height], |x, y| counts[y * width + x]);
-        let pairs = pixels.in_pairs();
+        let all = |_, _| true;
+        let pixels = SixteenthCounts::new([1, width, height], all, |x, y| counts[y * width + x]);
+        let pairs = pixels.in_pairs(all);
         let blur = BlurVariances { window: window * window / WINDOW_PER_KERNEL_VARIANCE, noise: noise_px * noise_px };
         let [pixels, pairs] =
             [pixels, pairs].map(|squares| moments(&squares, [x, y], window).expect("there are thousands"));
@@ -451,7 +463,8 @@ mod tests {
         let mut random = Random::new(92);
         for [width, height] in [[1, 1], [2, 3], [7, 4], [5, 9]] {
             let counts: Vec<_> = (0..width * height).map(|_| random.below(17) as u16).collect();
-            let pairs = SixteenthCounts::new([1, width, height], |x, y| counts[y * width + x]).in_pairs();
+            let all = |_, _| true;
+            let pairs = SixteenthCounts::new([1, width, height], all, |x, y| counts[y * width + x]).in_pairs(all);
             assert_eq!([pairs.side, pairs.columns, pairs.rows], [2, width.div_ceil(2), height.div_ceil(2)]);
             for (x, y) in (0..pairs.columns).flat_map(|x| (0..pairs.rows).map(move |y| (x, y))) {
                 let inside = |&at: &usize| at % width / 2 == x && at / width / 2 == y;

@@ -27,7 +27,7 @@ fn trimmed(drawing: &[&str]) -> Vec<String> {
     let mut rims = vec![EMPTY; TILE_AREA];
     for (y, row) in drawing.iter().enumerate() {
         for (x, pixel) in row.bytes().enumerate() {
-            rims[tiled_index(size[0] as usize, x, y)] = match pixel {
+            rims[y * TILE + x] = match pixel {
                 b'#' => -4.0,
                 b'+' => 4.0,
                 b'*' => 12.0,
@@ -36,8 +36,14 @@ fn trimmed(drawing: &[&str]) -> Vec<String> {
         }
     }
     let sixteenths = Sixteenths::with(size.map(|side| side as usize), []);
-    let outline =
-        Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred: None };
+    let outline = Outline {
+        rims: &rims,
+        centers: &[0; TILE_AREA],
+        sixteenths: &sixteenths,
+        tiles: &Tiles::all([TILE; 2]),
+        view: &view,
+        blurred: None,
+    };
     let edges = outline.edges([0, 0]);
     let row = |(y, row): (usize, &&str)| {
         let goes = |x: usize| outline.sticks_out(x, y, SHOWN, edges.near([x, y]));
@@ -109,7 +115,14 @@ fn stays(size: [usize; 2], points: &[[f32; 2]], drawn: &[[f32; 2]]) -> impl Fn(u
     let view = view(size.map(|side| side as u32));
     let sixteenths = Sixteenths::with(size, points.iter().copied());
     move |x, y| {
-        let outline = Outline { rims: &rims, centers: &centers, sixteenths: &sixteenths, view: &view, blurred: None };
+        let outline = Outline {
+            rims: &rims,
+            centers: &centers,
+            sixteenths: &sixteenths,
+            tiles: &Tiles::all([TILE; 2]),
+            view: &view,
+            blurred: None,
+        };
         let edges = outline.edges([0, 0]);
         rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, SHOWN, edges.near([x, y]))
     }
@@ -169,8 +182,14 @@ fn told(wide: bool, per_column: usize, depth: impl Fn(f32) -> f32) -> [f64; 2] {
         centers[y as usize * TILE + x as usize] += one([x as usize, y as usize], [x, y]);
     }
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
-    let outline =
-        Outline { rims: &[4.0; TILE_AREA], centers: &centers, sixteenths: &sixteenths, view: &view, blurred: None };
+    let outline = Outline {
+        rims: &[4.0; TILE_AREA],
+        centers: &centers,
+        sixteenths: &sixteenths,
+        tiles: &Tiles::all([TILE; 2]),
+        view: &view,
+        blurred: None,
+    };
     let mut counts = [0, 0, 0];
     for (x, y) in (3..TILE - 3).flat_map(|x| (3..TILE - 3).map(move |y| (x, y))) {
         let below = y as f32 + 0.5 - line(x as f32 + 0.5);
@@ -214,12 +233,14 @@ fn above_the_line(per_pixel: usize, noise_px: f32, sure: Option<f32>) -> Vec<f32
     let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
     let known = |sure: f32| Noise { level: noise_px * view.pixel_size(1.0), sure, ..Noise::NONE };
-    let blurred = BlurredBorders::new(sure.map_or(Noise::NONE, known), 1.6, &rims, &sixteenths, &view);
+    let blurred =
+        BlurredBorders::new(sure.map_or(Noise::NONE, known), 1.6, (&rims, &Tiles::all([TILE; 2])), &sixteenths, &view);
     assert_eq!(blurred.is_some(), sure.is_some(), "nothing is blurred without noise");
     let outline = Outline {
         rims: &rims,
         centers: &[0; TILE_AREA],
         sixteenths: &sixteenths,
+        tiles: &Tiles::all([TILE; 2]),
         view: &view,
         blurred: blurred.as_ref(),
     };
@@ -280,10 +301,17 @@ fn a_surface_before_a_denser_one_is_no_fringe() {
     let rims: Vec<_> = (0..TILE_AREA).map(|pixel| if pixel % TILE < 44 { -7.0 } else { EMPTY }).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
     let noise = Noise { level: 2.0 * view.pixel_size(1.0), ..Noise::NONE };
-    let blurred = BlurredBorders::new(noise, 1.6, &rims, &sixteenths, &view);
+    let blurred = BlurredBorders::new(noise, 1.6, (&rims, &Tiles::all([TILE; 2])), &sixteenths, &view);
     assert!(blurred.is_some(), "there is noise");
     let blurred = blurred.as_ref();
-    let outline = Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred };
+    let outline = Outline {
+        rims: &rims,
+        centers: &[0; TILE_AREA],
+        sixteenths: &sixteenths,
+        tiles: &Tiles::all([TILE; 2]),
+        view: &view,
+        blurred,
+    };
     let told = |x: usize| outline.is_beside_blurred([x, 32], SHOWN, 7.0);
     assert_eq!([30, 31, 32].map(told), [Some(false); 3], "where points become fewer, but go on");
     assert_eq!(told(43), Some(true), "where they end");
@@ -292,6 +320,7 @@ fn a_surface_before_a_denser_one_is_no_fringe() {
 #[test]
 fn blocks_know_how_far_an_empty_one_is() {
     let [width, height] = [TILE + 37, TILE + 5];
+    let tiles = Tiles::all([width, height]);
     let view = view([width as u32, height as u32]);
     let mut random = Random::new(56);
     let mut seen = BTreeSet::new();
@@ -300,17 +329,17 @@ fn blocks_know_how_far_an_empty_one_is() {
         for _ in 0..holes {
             let [x0, y0] = [random.below(width - 7), random.below(height - 7)];
             for (x, y) in (x0..x0 + 7).flat_map(|x| (y0..y0 + 7).map(move |y| (x, y))) {
-                rims[tiled_index(width, x, y)] = EMPTY;
+                rims[tiles.index([x, y])] = EMPTY;
             }
         }
         let noise = Noise { level: 1.0, ..Noise::NONE };
-        let blurred =
-            BlurredBorders::new(noise, 1.6, &rims, &Sixteenths::with([width, height], []), &view).expect("noise");
+        let blurred = BlurredBorders::new(noise, 1.6, (&rims, &tiles), &Sixteenths::with([width, height], []), &view)
+            .expect("noise");
         let [columns, rows] = [width, height].map(|side| side.div_ceil(BLOCK_PX));
         let is_empty = |bx: usize, by: usize| {
             let pixels =
                 (0..BLOCK_PX * BLOCK_PX).map(|at| [BLOCK_PX * bx + at % BLOCK_PX, BLOCK_PX * by + at / BLOCK_PX]);
-            pixels.filter(|&[x, y]| x < width && y < height).all(|[x, y]| rims[tiled_index(width, x, y)] == EMPTY)
+            pixels.filter(|&[x, y]| x < width && y < height).all(|[x, y]| rims[tiles.index([x, y])] == EMPTY)
         };
         let empty: Vec<_> =
             (0..columns).flat_map(|x| (0..rows).map(move |y| (x, y))).filter(|&(x, y)| is_empty(x, y)).collect();
@@ -331,7 +360,9 @@ fn what_is_empty_lies_where_it_does() {
         let rim = |pixel: usize| if is_empty(pixel % TILE, pixel / TILE) { EMPTY } else { 2.0 };
         let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
         let noise = Noise { level: 1.0, ..Noise::NONE };
-        let blurred = BlurredBorders::new(noise, 1.6, &rims, &Sixteenths::with([TILE; 2], []), &view).expect("noise");
+        let blurred =
+            BlurredBorders::new(noise, 1.6, (&rims, &Tiles::all([TILE; 2])), &Sixteenths::with([TILE; 2], []), &view)
+                .expect("noise");
         blurred.towards_empty(at, 16.0)
     };
     let is_near = |found: Option<[f32; 2]>, [x, y]: [f32; 2]| {
@@ -366,6 +397,7 @@ fn what_is_thin_stays() {
 #[test]
 fn borders_are_pixels_close_to_an_empty_square_and_gaps_those_close_to_an_empty_pixel() {
     let [width, height] = [TILE + 37, TILE + 5];
+    let tiles = Tiles::all([width, height]);
     let view = view([width as u32, height as u32]);
     let mut random = Random::new(52);
     let mut all = [0; 3];
@@ -373,9 +405,15 @@ fn borders_are_pixels_close_to_an_empty_square_and_gaps_those_close_to_an_empty_
         // Pixels of tiles beyond the picture do not matter.
         let rim = |_| if random.below(100) < empty_percent { EMPTY } else { 1.0 };
         let rims: Vec<_> = (0..4 * TILE_AREA).map(rim).collect();
-        let outline =
-            Outline { rims: &rims, centers: &[], sixteenths: &Sixteenths::default(), view: &view, blurred: None };
-        let is_empty = |x: usize, y: usize| x < width && y < height && rims[tiled_index(width, x, y)] == EMPTY;
+        let outline = Outline {
+            rims: &rims,
+            centers: &[],
+            sixteenths: &Sixteenths::default(),
+            tiles: &tiles,
+            view: &view,
+            blurred: None,
+        };
+        let is_empty = |x: usize, y: usize| x < width && y < height && rims[tiles.index([x, y])] == EMPTY;
         // (x, y) is the upper left pixel of the square.
         let is_square = |x: usize, y: usize| (0..9).all(|at| is_empty(x + at % 3, y + at / 3));
         for tile in [[0, 0], [TILE, 0], [0, TILE], [TILE, TILE]] {
@@ -422,8 +460,14 @@ fn slits_between_dense_points_open_beside_single_empty_pixels() {
     };
     let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
-    let outline =
-        Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred: None };
+    let outline = Outline {
+        rims: &rims,
+        centers: &[0; TILE_AREA],
+        sixteenths: &sixteenths,
+        tiles: &Tiles::all([TILE; 2]),
+        view: &view,
+        blurred: None,
+    };
     let edges = outline.edges([0, 0]);
     let pixels = (3..size[0] - 3).flat_map(|x| (3..size[1] - 3).map(move |y| [x, y]));
     // Right pixels and all pixels, inside the surfaces and inside the slit.
