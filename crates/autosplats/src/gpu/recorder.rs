@@ -41,6 +41,9 @@ pub(crate) struct Recorder<'a> {
     pub(crate) encoder: wgpu::CommandEncoder,
     clock: &'a Clock,
     times: Vec<PassTime>,
+    /// Number of compute passes begun.
+    #[cfg(test)]
+    pub(crate) begun: usize,
 }
 
 impl Clock {
@@ -117,7 +120,14 @@ pub(crate) fn stage_ms(stage: &str, times: &[PassTime], spans: &[[f64; 2]]) -> f
 
 impl<'a> Recorder<'a> {
     pub(crate) fn new(gpu: &'a Gpu, clock: &'a Clock) -> Self {
-        Self { gpu, encoder: encoder(gpu), clock, times: Vec::new() }
+        Self {
+            gpu,
+            encoder: encoder(gpu),
+            clock,
+            times: Vec::new(),
+            #[cfg(test)]
+            begun: 0,
+        }
     }
 
     /// Runs a step.
@@ -139,6 +149,10 @@ impl<'a> Recorder<'a> {
                     end_of_pass_write_index: end,
                 });
                 let descriptor = wgpu::ComputePassDescriptor { label, timestamp_writes };
+                #[cfg(test)]
+                {
+                    self.begun += 1;
+                }
                 let mut compute = self.encoder.begin_compute_pass(&descriptor);
                 compute.set_pipeline(pipeline);
                 compute.set_bind_group(0, bindings, &[]);
