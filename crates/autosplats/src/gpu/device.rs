@@ -155,7 +155,8 @@ impl Gpu {
     }
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self, Error> {
-        let optional = INT64_ATOMICS | wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::FLOAT32_BLENDABLE;
+        let timing = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
+        let optional = INT64_ATOMICS | timing | wgpu::Features::FLOAT32_BLENDABLE;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("autosplats"),
             required_features: adapter.features() & optional,

@@ -35,6 +35,13 @@ pub(super) enum StepWork {
     Raster(Raster),
 }
 
+impl Step {
+    /// The stage of the pass: the first folder of its path.
+    pub(super) fn stage(&self) -> &'static str {
+        self.path.split('/').next().unwrap_or(self.path)
+    }
+}
+
 #[cfg(test)]
 impl Step {
     /// Number of workgroups of a step that computes.
