@@ -37,7 +37,7 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> DeviceResults {
     let told = FrameUniform { longest: f32::MAX, ..FrameUniform::new(&case.view, K) };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
     let mut recorder = Recorder::new(gpu, &Clock::Off);
-    let mut steps = passes.steps_cells(gpu, &frame, &screen, &buffers);
+    let mut steps = Vec::from(passes.steps_cells(gpu, &frame, &screen, &buffers));
     for round in [Round::Active, Round::Recovered] {
         steps.extend(passes.steps(gpu, &frame, &screen, &surfels, &buffers, round));
     }

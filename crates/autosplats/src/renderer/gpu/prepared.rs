@@ -238,7 +238,7 @@ impl Prepared {
                     Stage::Draw(round) => {
                         steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
                     }
-                    Stage::Recover => steps.extend(splat.steps_recover(gpu, frame, &screen, &splats)),
+                    Stage::Recover => steps.extend(splat.steps_recover(gpu, frame, &screen)),
                     Stage::Keep => {
                         if shape.coherent {
                             steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));

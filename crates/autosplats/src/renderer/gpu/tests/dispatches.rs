@@ -86,6 +86,6 @@ fn dispatches_of_a_frame() {
     let usual = commands(Reconstruction::default());
     let of_the_paper =
         commands(Reconstruction { adaptive: false, points_per_pixel: 1, trim: false, ..Reconstruction::default() });
-    assert_eq!(usual, Commands { dispatches: 76, single: 14, indirect: 46, passes: 1, chain: 63 });
-    assert_eq!(of_the_paper, Commands { dispatches: 49, single: 12, indirect: 26, passes: 1, chain: 44 });
+    assert_eq!(usual, Commands { dispatches: 46, single: 2, indirect: 29, passes: 1, chain: 43 });
+    assert_eq!(of_the_paper, Commands { dispatches: 30, single: 0, indirect: 20, passes: 1, chain: 28 });
 }
