@@ -85,7 +85,7 @@ impl GpuRenderer {
         Ok(Self {
             clock: Clock::new(&gpu),
             times_passes: false,
-            uploader: Uploader::new(),
+            uploader: Uploader::default(),
             cloud: DeviceCloud::default(),
             sensors: None,
             depth_noise: DepthNoiseBuffer::new(&gpu)?,
@@ -276,7 +276,14 @@ impl GpuRenderer {
         let cloud = points.scene();
         let exposure = exposure.of(cloud, &settings.shading);
         let values = wanted.scalar(points).map(|values| values.about()).unwrap_or_default();
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
+        let scene = Scene {
+            view,
+            up: upward.of(cloud, &settings.shading.color),
+            origin: cloud.origin(),
+            unit,
+            exposure,
+            values,
+        };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         prepared.write_uniforms(gpu, frame, (screen, points, None), &rules, settings, &uniform);
 
@@ -359,7 +366,14 @@ impl GpuRenderer {
         let cloud = points.scene();
         let exposure = exposure.of(cloud, &settings.shading);
         let values = wanted.scalar(points).map(|values| values.about()).unwrap_or_default();
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
+        let scene = Scene {
+            view,
+            up: upward.of(cloud, &settings.shading.color),
+            origin: cloud.origin(),
+            unit,
+            exposure,
+            values,
+        };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let format = texture.format();
         let now = (&screen, points, Some(format));

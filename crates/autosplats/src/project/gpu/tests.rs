@@ -92,7 +92,7 @@ fn project<'a>(
 ) -> (ScreenPoints, Vec<u32>) {
     let points = points.into();
     let written = points.written_since(None);
-    let mut uploader = Uploader::new();
+    let mut uploader = Uploader::default();
     let mut device_cloud = DeviceCloud::default();
     device_cloud.resize(gpu, points).expect("room");
     uploader.positions(gpu, points.positions(), &written, &device_cloud, &|_| true).expect("an upload");
