@@ -311,10 +311,7 @@ impl AdaptPasses {
         let ScreenBuffers { counters, cell_start, points, .. } = screen;
         let AdaptBuffers { levels, tiles: [finest, coarser], clusters, asked, sheets, picked, .. } = buffers;
         let fill = [frame, counters, levels, cell_start, points, clusters, asked, sheets];
-        [
-            self.fill.step(gpu, &fill, *finest),
-            self.merge.step(gpu, &[frame, levels, clusters, picked], *coarser),
-        ]
+        [self.fill.step(gpu, &fill, *finest), self.merge.step(gpu, &[frame, levels, clusters, picked], *coarser)]
     }
 
     /// Steps that measure the noise (first round only, on active points) and adapt the surfels of `round`.

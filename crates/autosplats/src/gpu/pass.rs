@@ -37,7 +37,7 @@ impl Pass {
                 module: &made.shader,
                 entry_point: Some(source.entry_point()),
                 compilation_options: compilation_options(constants),
-                cache: None,
+                cache: gpu.pipelines.as_ref().map(|pipelines| pipelines.cache()),
             });
             Self {
                 path: source.path,

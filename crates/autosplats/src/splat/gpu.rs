@@ -20,9 +20,7 @@ use crate::adapt::FrameStatistics;
 use crate::fit::{SUPPORT, Surfel};
 use crate::gpu::{Gpu, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
 use crate::project::MARGIN_REACH;
-use crate::project::gpu::{
-    Counter, LARGE_SPLAT_GROUPS, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, few_constant,
-};
+use crate::project::gpu::{Counter, LARGE_SPLAT_GROUPS, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, few_constant};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
@@ -258,12 +256,7 @@ impl SplatPasses {
     }
 
     /// Appends to the queries the passive points that the depth map does not surely hide [Paper, §7, Grid Culling].
-    pub(crate) fn steps_recover(
-        &self,
-        gpu: &Gpu,
-        frame: &wgpu::Buffer,
-        screen: &ScreenBuffers,
-    ) -> [Step; 2] {
+    pub(crate) fn steps_recover(&self, gpu: &Gpu, frame: &wgpu::Buffer, screen: &ScreenBuffers) -> [Step; 2] {
         let ScreenBuffers { counters, density, points, passive, block_sums, queries, depth, arguments, .. } = screen;
         let blocks = || screen.groups(Work::PassiveBlocks);
         let count = [frame, points, passive, counters, density, depth, block_sums];
