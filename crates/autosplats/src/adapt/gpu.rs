@@ -70,7 +70,7 @@ const LIBRARY: Library = Library {
             CELLS_TO_COUNT, LEAST_ON, MAX_SURFACE_MEAN_RADII, MAX_SURFACE_VARIATION, MIN_SURFACE_WIDTH_RATIO,
             MIN_TESTED_FIRST_RADII, ON_DISC, ON_DISC_NOISE, SURFACE_BALL_K_RADII
         ),
-        constants![BUNCH, SAMPLE_PARTS, TILE, TILE_LEVELS],
+        constants![BUNCH, SAMPLE_PARTS, TILE],
     ],
 };
 
@@ -97,8 +97,9 @@ const BUNCH: usize = 4;
 const SAMPLE_PARTS: usize = 4;
 /// Columns and rows of cells in a workgroup's tile. It has an invocation for each cell.
 const TILE: u32 = 16;
-/// Levels that a tile has cells of.
-const TILE_LEVELS: u32 = TILE.trailing_zeros() + 1;
+/// Coarser levels that a workgroup fills within its tile, on hardware and on a software device. There, invocations
+/// without a cell take as long as others, so that each level is better filled by a dispatch of its own.
+const COARSER: [usize; 2] = [TILE.trailing_zeros() as usize, 0];
 
 /// `Level` of `imports/levels.wgsl`: side, columns, rows and first cell.
 type Level = [u32; 4];
@@ -129,8 +130,8 @@ pub(crate) struct AdaptBuffers {
     levels: wgpu::Buffer,
     /// Workgroups that fit sheets, three `u32`.
     arguments: wgpu::Buffer,
-    /// Workgroups that fill levels: those of the finest tiles, then of the coarser ones.
-    tiles: [u32; 2],
+    /// Most tiles of each level.
+    tiles: [u32; MOST_LEVELS],
     clusters: wgpu::Buffer,
     /// [`Asked`] per cell.
     asked: wgpu::Buffer,
@@ -169,7 +170,7 @@ impl AdaptBuffers {
                 DISPATCH_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
-            tiles: [0, TILE_LEVELS].map(|level| most_tiles(size, most_finest, level)),
+            tiles: std::array::from_fn(|level| most_tiles(size, most_finest, level)),
             clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size, most_finest))?,
             asked: gpu.storage::<Asked>("surfels that ask for sheets", sheet_cells)?,
             sheets: gpu.storage::<[Sheet; SHEETS]>("sheets", sheet_cells)?,
@@ -246,7 +247,7 @@ fn most_sheet_cells(size: [u32; 2], most_finest: usize) -> usize {
 }
 
 /// Largest number of tiles of a level, for a picture of `size`.
-fn most_tiles(size: [u32; 2], most_finest: usize, level: u32) -> u32 {
+fn most_tiles(size: [u32; 2], most_finest: usize, level: usize) -> u32 {
     let tile_px = TILE * ((least_side_px(size, most_finest) as u32) << level);
     size.map(|side| side.div_ceil(tile_px)).iter().product()
 }
@@ -256,6 +257,8 @@ fn most_tiles(size: [u32; 2], most_finest: usize, level: u32) -> u32 {
 pub(crate) struct AdaptPasses {
     fill: Pass,
     merge: Pass,
+    /// Levels that a dispatch fills first, and a uniform with each.
+    firsts: Vec<(usize, wgpu::Buffer)>,
     pick: Pass,
     sample: Pass,
     scatter: Pass,
@@ -274,11 +277,20 @@ impl AdaptPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Self::with_form(gpu, TOGETHER[usize::from(gpu.is_software())])
+        Self::for_kind(gpu, gpu.is_software())
     }
 
-    fn with_form(gpu: &Gpu, together: u32) -> Result<Self, Error> {
-        let together = ("TOGETHER", together.into());
+    /// Compiles the passes that suit hardware or software.
+    fn for_kind(gpu: &Gpu, software: bool) -> Result<Self, Error> {
+        let kind = usize::from(software);
+        let together = ("TOGETHER", TOGETHER[kind].into());
+        let coarser = ("COARSER", COARSER[kind] as f64);
+        let first = |level: usize| {
+            let told = gpu.uniform::<u32>("first level")?;
+            gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&(level as u32)));
+            Ok::<_, Error>((level, told))
+        };
+        let step = COARSER[kind] + 1;
         let few = few_constant(gpu);
         let pass = |source| Pass::new(gpu, source, &[]);
         let ask = |round: Round| Pass::new(gpu, &ASK, &[round.constant()]);
@@ -286,8 +298,9 @@ impl AdaptPasses {
         let turn_rows = |round: Round| Pass::new(gpu, &TURN_ROWS, &[round.constant(), together, few]);
         let most_finest = ("MOST_FINEST", most_finest(gpu.most_bound()) as f64);
         Ok(Self {
-            fill: Pass::new(gpu, &FILL, &[most_finest])?,
-            merge: pass(&MERGE)?,
+            fill: Pass::new(gpu, &FILL, &[most_finest, coarser])?,
+            merge: Pass::new(gpu, &MERGE, &[coarser])?,
+            firsts: (step..MOST_LEVELS).step_by(step).map(first).collect::<Result<_, _>>()?,
             pick: pass(&PICK)?,
             sample: pass(&SAMPLE_PASS)?,
             scatter: Pass::new(gpu, &SCATTERS, &[together])?,
@@ -307,11 +320,15 @@ impl AdaptPasses {
         frame: &wgpu::Buffer,
         screen: &ScreenBuffers,
         buffers: &AdaptBuffers,
-    ) -> [Step; 2] {
+    ) -> Vec<Step> {
         let ScreenBuffers { counters, cell_start, points, .. } = screen;
-        let AdaptBuffers { levels, tiles: [finest, coarser], clusters, asked, sheets, picked, .. } = buffers;
+        let AdaptBuffers { levels, tiles, clusters, asked, sheets, picked, .. } = buffers;
         let fill = [frame, counters, levels, cell_start, points, clusters, asked, sheets];
-        [self.fill.step(gpu, &fill, *finest), self.merge.step(gpu, &[frame, levels, clusters, picked], *coarser)]
+        let fill = self.fill.step(gpu, &fill, tiles[0]);
+        let merge = |(level, first): &(usize, wgpu::Buffer)| {
+            self.merge.step(gpu, &[frame, levels, clusters, picked, first], tiles[*level])
+        };
+        [fill].into_iter().chain(self.firsts.iter().map(merge)).collect()
     }
 
     /// Steps that measure the noise (first round only, on active points) and adapt the surfels of `round`.

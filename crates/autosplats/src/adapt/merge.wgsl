@@ -1,7 +1,7 @@
-// Fills the levels of cells that are too coarse for the tiles of `fill`: again a workgroup per tile, of the first of
-// these levels. Resets the number of picked surfels.
+// Fills the levels of cells that are too coarse for the tiles of the last dispatch: again a workgroup per tile, of the
+// first of these levels. Resets the number of picked surfels.
 //
-// Reads: levels. Reads and writes: clusters. Writes: picked.
+// Reads: levels, first. Reads and writes: clusters. Writes: picked.
 
 #import frame
 #import groups
@@ -11,6 +11,8 @@
 @group(0) @binding(1) var<storage, read> levels: array<Level>;
 @group(0) @binding(2) var<storage, read_write> clusters: array<vec4f>;
 @group(0) @binding(3) var<storage, read_write> picked: array<u32>;
+// The first level to fill.
+@group(0) @binding(4) var<uniform> first: u32;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn merge(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -22,10 +24,10 @@ fn merge(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         all_levels[local] = levels[local];
     }
     workgroupBarrier();
-    let tile = tile_of(all_levels[TILE_LEVELS], group);
+    let tile = tile_of(all_levels[first], group);
     let place = TILE * tile + vec2u(local % TILE, local / TILE);
-    if has_cell(all_levels[TILE_LEVELS], place) {
-        merge_cell(TILE_LEVELS, place);
+    if has_cell(all_levels[first], place) {
+        merge_cell(first, place);
     }
-    merge_tile(TILE_LEVELS, tile, local);
+    merge_tile(first, tile, local);
 }

@@ -7,6 +7,9 @@
 #import filling
 #import levels
 
+// Coarser levels that a workgroup fills within its tile.
+override COARSER: u32;
+
 // The levels, to be set first.
 var<workgroup> all_levels: array<Level, MOST_LEVELS>;
 
@@ -45,7 +48,7 @@ fn merge_cell(index: u32, place: vec2u) {
 
 // Fills the levels above `filled` within a tile of that level. To be called by all invocations of a workgroup.
 fn merge_tile(filled: u32, tile: vec2u, local: u32) {
-    for (var up = 1u; up < TILE_LEVELS; up++) {
+    for (var up = 1u; up <= COARSER; up++) {
         // The cells below are those of this workgroup.
         storageBarrier();
         let level = filled + up;
