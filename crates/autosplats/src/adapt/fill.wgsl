@@ -1,5 +1,5 @@
-// Lays out the levels of cells, and fills the finest with screen points: an invocation per cell. A workgroup takes a tile
-// of cells and fills coarser levels within it. Discards the sheets of the last frame.
+// Lays out the levels of cells, and fills the finest with screen points: an invocation per cell. A workgroup takes a
+// tile of cells and fills coarser levels within it. Discards the sheets of the last frame.
 //
 // Reads: counters, cell_start, points. Writes: levels, asked, sheets. Reads and writes: clusters.
 

@@ -2,7 +2,7 @@
 //!
 //! # How it works
 //! Consecutive compute steps share a compute pass of wgpu, which makes command buffers and a barrier of every pass.
-//! What draws or copies ends the pass. Timed is each run of steps of a stage, or each step where a caller asks for that.
+//! What draws or copies ends the pass. Timed is each run of steps of a stage, or each step where a caller asks for it.
 //! See docs/decisions/0052-one-compute-pass.md.
 
 use std::time::Instant;

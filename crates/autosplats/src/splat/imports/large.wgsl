@@ -1,5 +1,6 @@
 // Large splats, which one invocation would draw for too long: the first LARGE_SPLAT_GROUPS workgroups of a dispatch
-// take them from their list, a team of SMALL_GROUP invocations a splat. The including pass binds `counters` and `large`.
+// take them from their list, a team of SMALL_GROUP invocations a splat. The including pass binds `counters` and
+// `large`.
 
 const TEAMS = LARGE_GROUP / SMALL_GROUP;
 // Places in the list from a team's splat to its next.
