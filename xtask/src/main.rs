@@ -1,5 +1,6 @@
 //! The project's own tasks. `cargo xtask test` is everything CI runs.
 
+mod card;
 mod environment;
 mod formats;
 mod lanes;
@@ -39,6 +40,9 @@ usage: cargo xtask test               runs every check of CI: rules, lints, docu
        cargo xtask performance --page | --machine NAME [--only TEXT] [--program PATH --commit HASH]
                                   docs/PERFORMANCE.md, from docs/performance/*.json; NAME.json is measured first, in some ten
                                   minutes, with --only those jobs that contain TEXT, as gpu does, with --program another build
+       cargo xtask card [--program PATH]
+                                  where the time of a frame goes on a graphics card, by stages and by passes; some six
+                                  minutes; the program is built unless it is given
        cargo xtask pictures OUT [--program PATH]
                                   a fixed list of pictures, layers and normals in the empty folder OUT, with a hash of each
        cargo xtask pictures --compare BEFORE AFTER
@@ -66,6 +70,11 @@ fn main() -> ExitCode {
         ["formats", "--program", program] => root().and_then(|root| formats::write(root, program.as_ref())),
         ["formats", "--check"] => root().and_then(|root| formats::check(root, &formats::build(root)?)),
         ["performance", options @ ..] => root().and_then(|root| performance::run(root, options)),
+        ["card"] => root().and_then(|root| build_command(root, "dist")).map(|program| card::run(&program)),
+        ["card", "--program", program] => {
+            card::run(program.as_ref());
+            Ok(())
+        }
         ["pictures", "--compare", before, after] => {
             root().and_then(|root| pictures::run(root, &pictures::Task::Compare([before.as_ref(), after.as_ref()])))
         }

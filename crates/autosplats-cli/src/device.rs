@@ -31,7 +31,7 @@ impl Device {
         match adapter {
             None => format!("{backend}: {name}, {threads} threads"),
             Some(AdapterSummary { backend: api, driver, software, .. }) => {
-                let timed = if *software { "; software on the CPU, waits after each pass" } else { "" };
+                let timed = if *software { "; software on the CPU, waits after what is timed" } else { "" };
                 format!("{backend}: {name}, {api}, driver {driver}{timed}")
             }
         }

@@ -12,6 +12,7 @@ const BENCH_EXAMPLES: &str = "\
 Examples:
   autosplats bench
   autosplats bench --scene cathedral:10M --backend cpu,gpu
+  autosplats bench --scene statue:1M --backend gpu --passes
   autosplats bench --scene statue:1M --noise 0.005
   autosplats bench --scene statue:1M -k 20 --size 1280x720 --frames 100 --json
   autosplats bench --scene cathedral:10M --backend gpu --stream
@@ -39,12 +40,15 @@ pub(crate) struct BenchArgs {
     /// Width and height of the picture in pixels, each 1 to 16384
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size, allow_hyphen_values = true)]
     pub(crate) size: [u32; 2],
-    /// Number of frames to measure, 1 to 100000, after three that are not measured
+    /// Number of frames to measure, 1 to 100000, after a second of frames that are not measured
     #[arg(long, value_name = "COUNT", default_value = "20", value_parser = values::frames, allow_negative_numbers = true)]
     pub(crate) frames: usize,
     /// Treat the points as new in each frame, like a live scanner's; a GPU has to upload them every time
     #[arg(long)]
     pub(crate) stream: bool,
+    /// Time each pass of a GPU by itself, and what lies between them; frames then take longer
+    #[arg(long)]
+    pub(crate) passes: bool,
     /// Print one JSON object on standard output: scene, device, counts, milliseconds per stage and pass
     #[arg(long)]
     pub(crate) json: bool,

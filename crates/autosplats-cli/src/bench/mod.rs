@@ -1,14 +1,16 @@
-//! `autosplats bench`: times each stage and pass of a frame, on each requested backend.
+//! `autosplats bench`: times each stage of a frame, on each requested backend, and each pass if asked.
 
+mod clocks;
 mod paper;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use autosplats::{Counts, PassTime, Renderer, Settings, Timings};
 use autosplats_cloud::PointCloud;
 use autosplats_scenes::SCENE_PREFIX;
 use serde::Serialize;
 
+use self::clocks::{Clock, ClockReader};
 use crate::args::{BenchArgs, Evaluation};
 use crate::console::Console;
 use crate::device::Device;
@@ -19,7 +21,9 @@ use crate::progress::Bar;
 use crate::render::scene_camera;
 use crate::values::Neighbors;
 
-/// Frames before the measured ones, in which buffers are created, caches filled and clocks raised.
+/// Time and least number of frames before the measured ones. Buffers are created, caches filled, and the clocks of an
+/// idle device raised, which takes longer than a few frames.
+const WARM_UP: Duration = Duration::from_secs(1);
 const WARM_UP_FRAMES: usize = 3;
 
 /// Prefix of the passes that build the kd-tree, as opposed to searching it.
@@ -59,14 +63,21 @@ struct Run {
     /// Time from the request for a picture to the finished picture, in milliseconds.
     picture_ms: f64,
     timings_ms: Timings,
+    /// Each pass if asked, else runs of passes of a stage.
     passes: Vec<PassTime>,
+    /// The frame's time that no pass took; only if each pass is timed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    between_passes_ms: Option<f64>,
+    /// Clock of the device's processors while it rendered, where its driver tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clock: Option<Clock>,
     /// Points without a complete neighbourhood, before the first iteration and after each; only of iterative engines.
     unconverged: Vec<u32>,
 }
 
 /// Renders the same frame repeatedly and prints the medians.
 pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<(), Failure> {
-    let BenchArgs { evaluation, scene, neighbors, backends, no_trim, noise, size, frames, stream, json, run: _ } = args;
+    let BenchArgs { evaluation, scene, neighbors, backends, no_trim, noise, size, frames, stream, .. } = args;
     if let Some(Evaluation::Paper(args)) = evaluation {
         return paper::run(args, console);
     }
@@ -103,7 +114,7 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<(), Failure> {
     for mut renderer in renderers {
         bench.runs.push(measure(&mut renderer, &inputs, &cloud, settings.clone(), args, console)?);
     }
-    if *json { console.print_json(&bench) } else { console.print_line(bench.table(&cloud)) }
+    if args.json { console.print_json(&bench) } else { console.print_line(bench.table(&cloud)) }
 }
 
 fn measure(
@@ -120,20 +131,30 @@ fn measure(
     let first_radius = args.neighbors.first_radius;
     settle_first_radius(&mut settings, first_radius, renderer, cloud, &camera, args.size, console)?;
     let bar = Bar::spinner(&format!("{} frames on {}", args.frames, device.name), console);
+    renderer.time_passes(args.passes);
     let mut samples: Vec<(f64, Timings, Vec<PassTime>)> = Vec::new();
     let (mut counts, mut first_upload_ms, mut first_picture_ms) = (Counts::default(), 0.0, 0.0);
     // A renderer takes clouds of another identity as new points, so two alternating clouds are always new.
     let other = args.stream.then(|| copy(cloud)).transpose()?;
-    for frame in 0..WARM_UP_FRAMES + args.frames {
+    let began = Instant::now();
+    let mut clocks = None;
+    for frame in 0.. {
         let cloud = other.as_ref().filter(|_| frame % 2 == 1).unwrap_or(cloud);
+        let is_warm = frame >= WARM_UP_FRAMES && (clocks.is_some() || began.elapsed() >= WARM_UP);
+        if is_warm && clocks.is_none() {
+            clocks = Some(ClockReader::start(device.adapter.as_ref()));
+        }
         let started = Instant::now();
         let rendered = renderer.render_while(cloud, &camera, args.size, &settings, &console.goes_on())?;
         let picture_ms = started.elapsed().as_secs_f64() * 1e3;
         if frame == 0 {
             (counts, first_upload_ms, first_picture_ms) = (rendered.counts, rendered.timings.upload, picture_ms);
         }
-        if frame >= WARM_UP_FRAMES {
+        if is_warm {
             samples.push((picture_ms, rendered.timings, rendered.passes.to_vec()));
+        }
+        if samples.len() == args.frames {
+            break;
         }
     }
     drop(bar);
@@ -142,6 +163,8 @@ fn measure(
         pass: first.pass,
         ms: median(samples.iter().map(|(.., passes)| passes[pass].ms)),
     });
+    let between =
+        samples.iter().map(|(_, timings, passes)| timings.frame - passes.iter().map(|time| time.ms).sum::<f64>());
     Ok(Run {
         counts,
         first_upload_ms,
@@ -158,6 +181,8 @@ fn measure(
             frame: of(&|timings| timings.frame),
         },
         passes: passes.collect(),
+        between_passes_ms: (args.passes && renderer.adapter().is_some()).then(|| median(between)),
+        clock: clocks.and_then(ClockReader::finish),
         unconverged: renderer.convergence()?,
         device,
     })
@@ -200,10 +225,22 @@ impl Bench<'_> {
             cloud.len()
         )];
         for run in runs {
-            let Run { device, counts, first_upload_ms, first_picture_ms, picture_ms, timings_ms, passes, unconverged } =
-                run;
+            let Run {
+                device,
+                counts,
+                first_upload_ms,
+                first_picture_ms,
+                picture_ms,
+                timings_ms,
+                passes,
+                unconverged,
+                ..
+            } = run;
             lines.push(String::new());
             lines.push(device.describe());
+            if let Some(Clock { median_mhz, most_mhz }) = run.clock {
+                lines.push(format!("  its clock: {median_mhz} MHz of {most_mhz}"));
+            }
             let Counts { visible, active, recovered, .. } = counts;
             lines.push(format!("  {visible} points visible, {active} reconstructed at first, {recovered} recovered"));
             if let [queries, left @ ..] = &unconverged[..] {
@@ -227,6 +264,9 @@ impl Bench<'_> {
                     line("  build the tree", build);
                     line("  search the tree", search - build);
                 }
+            }
+            if let Some(ms) = run.between_passes_ms {
+                line("between passes", ms);
             }
             line("frame", *frame);
             line("picture on the host", *picture_ms);

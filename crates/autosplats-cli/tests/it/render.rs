@@ -361,8 +361,11 @@ fn both_backends_make_the_same_files() {
     let report: Value = serde_json::from_slice(&output.stdout).expect("the report is JSON");
     assert_eq!(report["device"]["backend"], "gpu", "the backend is named");
     assert!(report["device"]["adapter"]["driver"].is_string(), "and the driver: {report}");
-    let passes = report["passes"].as_array().expect("passes are listed");
-    assert!(passes.len() > 20 && passes.iter().all(|pass| pass["ms"].is_number()), "each is timed: {passes:?}");
+    let passes = report["passes"].as_array().expect("times are listed");
+    assert!(
+        passes.len() > 5 && passes.iter().all(|pass| pass["ms"].is_number()),
+        "runs of passes are timed: {passes:?}"
+    );
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::{self as adapt, SCALES, cells, depth, noise, quadric, rows, rules, sh
 use crate::Error;
 use crate::fit::{self, Surfel};
 use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
-use crate::project::gpu::{Counter, Round, ScreenBuffers, few};
+use crate::project::gpu::{Counter, Round, ScreenBuffers, few_constant};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
@@ -20,7 +20,9 @@ const LIBRARY: Library = Library {
         "clusters",
         "depth_noise",
         "filling",
+        "layout",
         "levels",
+        "merging",
         "quadric",
         "quantiles",
         "rows",
@@ -68,16 +70,14 @@ const LIBRARY: Library = Library {
             CELLS_TO_COUNT, LEAST_ON, MAX_SURFACE_MEAN_RADII, MAX_SURFACE_VARIATION, MIN_SURFACE_WIDTH_RATIO,
             MIN_TESTED_FIRST_RADII, ON_DISC, ON_DISC_NOISE, SURFACE_BALL_K_RADII
         ),
-        constants![BUNCH, SAMPLE_PARTS, WORK_SHEETS],
+        constants![BUNCH, SAMPLE_PARTS, TILE],
     ],
 };
 
 passes! {
     "adapt", LIBRARY;
-    ARRANGE = "arrange",
     FILL = "fill",
     MERGE = "merge",
-    FORGET = "forget",
     PICK = "pick",
     SAMPLE_PASS = "sample",
     SCATTERS = "scatter",
@@ -95,8 +95,11 @@ const TOGETHER: [u32; 2] = [32, 8];
 const BUNCH: usize = 4;
 /// Parts of the sample that have quantiles: its densest third, its sparsest third, all, and all by steady shares.
 const SAMPLE_PARTS: usize = 4;
-/// Index of the dispatch that fits sheets; those before it fill the levels.
-const WORK_SHEETS: usize = MOST_LEVELS;
+/// Columns and rows of cells in a workgroup's tile. It has an invocation for each cell.
+const TILE: u32 = 16;
+/// Coarser levels that a workgroup fills within its tile, on hardware and on a software device. There, invocations
+/// without a cell take as long as others, so that each level is better filled by a dispatch of its own.
+const COARSER: [usize; 2] = [TILE.trailing_zeros() as usize, 0];
 
 /// `Level` of `imports/levels.wgsl`: side, columns, rows and first cell.
 type Level = [u32; 4];
@@ -125,8 +128,10 @@ pub(crate) struct Asked {
 #[derive(Debug)]
 pub(crate) struct AdaptBuffers {
     levels: wgpu::Buffer,
-    /// Workgroups that fill each level, three `u32`, then those that fit sheets.
+    /// Workgroups that fit sheets, three `u32`.
     arguments: wgpu::Buffer,
+    /// Most tiles of each level.
+    tiles: [u32; MOST_LEVELS],
     clusters: wgpu::Buffer,
     /// [`Asked`] per cell.
     asked: wgpu::Buffer,
@@ -161,10 +166,11 @@ impl AdaptBuffers {
         Ok(Self {
             levels: gpu.storage::<Level>("levels of cells", MOST_LEVELS)?,
             arguments: gpu.buffer(
-                "arguments of levels",
-                (WORK_SHEETS as u64 + 1) * DISPATCH_BYTES,
+                "arguments of sheets",
+                DISPATCH_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
+            tiles: std::array::from_fn(|level| most_tiles(size, most_finest, level)),
             clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size, most_finest))?,
             asked: gpu.storage::<Asked>("surfels that ask for sheets", sheet_cells)?,
             sheets: gpu.storage::<[Sheet; SHEETS]>("sheets", sheet_cells)?,
@@ -240,20 +246,24 @@ fn most_sheet_cells(size: [u32; 2], most_finest: usize) -> usize {
     size.map(|side| (side as usize).div_ceil(side_px)).iter().product()
 }
 
+/// Largest number of tiles of a level, for a picture of `size`.
+fn most_tiles(size: [u32; 2], most_finest: usize, level: usize) -> u32 {
+    let tile_px = TILE * ((least_side_px(size, most_finest) as u32) << level);
+    size.map(|side| side.div_ceil(tile_px)).iter().product()
+}
+
 /// The passes of the stage.
 #[derive(Debug)]
 pub(crate) struct AdaptPasses {
-    arrange: Pass,
     fill: Pass,
     merge: Pass,
-    /// Uniforms with the level to fill, for each level but the finest.
-    which: Vec<wgpu::Buffer>,
+    /// Levels that a dispatch fills first, and a uniform with each.
+    firsts: Vec<(usize, wgpu::Buffer)>,
     pick: Pass,
     sample: Pass,
     scatter: Pass,
     quantile: Pass,
     noise: Pass,
-    forget: Pass,
     fit_sheets: Pass,
     /// One pass per round, as the next two.
     ask: [Pass; 2],
@@ -267,33 +277,35 @@ impl AdaptPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Self::with_form(gpu, TOGETHER[usize::from(gpu.is_software())])
+        Self::for_kind(gpu, gpu.is_software())
     }
 
-    fn with_form(gpu: &Gpu, together: u32) -> Result<Self, Error> {
-        let together = ("TOGETHER", together.into());
-        let few = ("ITEMS_PER_GROUP", few(gpu).into());
+    /// Compiles the passes that suit hardware or software.
+    fn for_kind(gpu: &Gpu, software: bool) -> Result<Self, Error> {
+        let kind = usize::from(software);
+        let together = ("TOGETHER", TOGETHER[kind].into());
+        let coarser = ("COARSER", COARSER[kind] as f64);
+        let first = |level: usize| {
+            let told = gpu.uniform::<u32>("first level")?;
+            gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&(level as u32)));
+            Ok::<_, Error>((level, told))
+        };
+        let step = COARSER[kind] + 1;
+        let few = few_constant(gpu);
         let pass = |source| Pass::new(gpu, source, &[]);
         let ask = |round: Round| Pass::new(gpu, &ASK, &[round.constant()]);
         let adapt = |round: Round| Pass::new(gpu, &ADAPT, &[round.constant()]);
         let turn_rows = |round: Round| Pass::new(gpu, &TURN_ROWS, &[round.constant(), together, few]);
-        let which = |level: usize| {
-            let told = gpu.uniform::<u32>("level")?;
-            gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&(level as u32)));
-            Ok::<_, Error>(told)
-        };
         let most_finest = ("MOST_FINEST", most_finest(gpu.most_bound()) as f64);
         Ok(Self {
-            arrange: Pass::new(gpu, &ARRANGE, &[most_finest, few])?,
-            fill: pass(&FILL)?,
-            merge: pass(&MERGE)?,
-            which: (1..MOST_LEVELS).map(which).collect::<Result<_, _>>()?,
+            fill: Pass::new(gpu, &FILL, &[most_finest, coarser])?,
+            merge: Pass::new(gpu, &MERGE, &[coarser])?,
+            firsts: (step..MOST_LEVELS).step_by(step).map(first).collect::<Result<_, _>>()?,
             pick: pass(&PICK)?,
             sample: pass(&SAMPLE_PASS)?,
             scatter: Pass::new(gpu, &SCATTERS, &[together])?,
             quantile: pass(&QUANTILES)?,
-            noise: pass(&NOISE)?,
-            forget: pass(&FORGET)?,
+            noise: Pass::new(gpu, &NOISE, &[few])?,
             fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[together, few])?,
             ask: [ask(Round::Active)?, ask(Round::Recovered)?],
             adapt: [adapt(Round::Active)?, adapt(Round::Recovered)?],
@@ -310,16 +322,13 @@ impl AdaptPasses {
         buffers: &AdaptBuffers,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, cell_start, points, .. } = screen;
-        let AdaptBuffers { levels, arguments, clusters, asked, sheets, picked, .. } = buffers;
-        let groups = |level: usize| Groups::Counted(arguments.clone(), level as u64 * DISPATCH_BYTES);
-        let mut steps = vec![
-            self.arrange.step(gpu, &[frame, counters, levels, arguments, picked], 1),
-            self.fill.step(gpu, &[frame, counters, levels, cell_start, points, clusters], groups(0)),
-        ];
-        let merge = |(level, which)| self.merge.step(gpu, &[frame, levels, clusters, which], groups(level));
-        steps.extend((1..).zip(&self.which).map(merge));
-        steps.push(self.forget.step(gpu, &[levels, asked, sheets], groups(SHEET_LEVELS[0])));
-        steps
+        let AdaptBuffers { levels, tiles, clusters, asked, sheets, picked, .. } = buffers;
+        let fill = [frame, counters, levels, cell_start, points, clusters, asked, sheets];
+        let fill = self.fill.step(gpu, &fill, tiles[0]);
+        let merge = |(level, first): &(usize, wgpu::Buffer)| {
+            self.merge.step(gpu, &[frame, levels, clusters, picked, first], tiles[*level])
+        };
+        [fill].into_iter().chain(self.firsts.iter().map(merge)).collect()
     }
 
     /// Steps that measure the noise (first round only, on active points) and adapt the surfels of `round`.
@@ -338,12 +347,13 @@ impl AdaptPasses {
         let mut steps = Vec::new();
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
+            let noise = [frame, surfels, sampled, quantiles, statistics, levels, depth_noise, arguments];
             steps.extend([
                 self.pick.step(gpu, &[counters, surfels, names, picked], screen.groups(round.work_64())),
                 self.sample.step(gpu, &[surfels, picked, sampled], (MOST_SAMPLED as u32).div_ceil(SMALL_GROUP)),
                 self.scatter.step(gpu, &balls, (SCALES * MOST_SAMPLED) as u32),
                 self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], (SAMPLE_PARTS * SCALES) as u32),
-                self.noise.step(gpu, &[frame, surfels, sampled, quantiles, statistics], 1),
+                self.noise.step(gpu, &noise, 1),
             ]);
         }
         let ask = [frame, counters, levels, statistics, surfels, depth_noise, asked];
@@ -353,7 +363,7 @@ impl AdaptPasses {
         let round_at = round as usize;
         steps.extend([
             self.ask[round_at].step(gpu, &ask, screen.groups(round.work_64())),
-            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), WORK_SHEETS as u64 * DISPATCH_BYTES)),
+            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), 0)),
             self.adapt[round_at].step(gpu, &adapt, screen.groups(round.work_64())),
             self.turn_rows[round_at].step(gpu, &turn_rows, screen.groups(round.work_few())),
         ]);

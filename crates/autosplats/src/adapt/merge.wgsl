@@ -1,40 +1,33 @@
-// Fills a level of cells from the next finer one: an invocation per cell. Run once for each level but the finest.
+// Fills the levels of cells that are too coarse for the tiles of the last dispatch: again a workgroup per tile, of the
+// first of these levels. Resets the number of picked surfels.
 //
-// Reads: levels, which. Reads and writes: clusters.
+// Reads: levels, first. Reads and writes: clusters. Writes: picked.
 
 #import frame
-#import clusters
-#import filling
 #import groups
 #import levels
+#import merging
 
 @group(0) @binding(1) var<storage, read> levels: array<Level>;
 @group(0) @binding(2) var<storage, read_write> clusters: array<vec4f>;
-// The level to fill.
-@group(0) @binding(3) var<uniform> which: u32;
+@group(0) @binding(3) var<storage, read_write> picked: array<u32>;
+// The first level to fill.
+@group(0) @binding(4) var<uniform> first: u32;
 
-@compute @workgroup_size(SMALL_GROUP)
+@compute @workgroup_size(LARGE_GROUP)
 fn merge(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let level = levels[which];
-    let below = levels[which - 1u];
-    let index = group_index(workgroup) * SMALL_GROUP + local;
-    if index >= level.columns * level.rows {
-        return;
+    let group = group_index(workgroup);
+    if group == 0u && local == 0u {
+        picked[MOST_SAMPLED] = 0u;
     }
-    let slabs = slabs_of(level.side_px);
-    let low = 2u * place_in(level, index);
-    let high = min(low + 2u, vec2u(below.columns, below.rows));
-    for (var y = low.y; y < high.y; y++) {
-        for (var x = low.x; x < high.x; x++) {
-            let cell = below.first + y * below.columns + x;
-            for (var slab = 0u; slab < SLABS; slab++) {
-                let cluster = clusters[cluster_at(cell, slab)];
-                if cluster.w == 0.0 {
-                    break;
-                }
-                add(cluster.xyz, cluster.w, slab_of(slabs, cluster.z));
-            }
-        }
+    if local < MOST_LEVELS {
+        all_levels[local] = levels[local];
     }
-    finish(level.first + index);
+    workgroupBarrier();
+    let tile = tile_of(all_levels[first], group);
+    let place = TILE * tile + vec2u(local % TILE, local / TILE);
+    if has_cell(all_levels[first], place) {
+        merge_cell(first, place);
+    }
+    merge_tile(first, tile, local);
 }

@@ -1,9 +1,13 @@
-// The noise level: how far points scatter about the surface. See the CPU form. One invocation.
+// The noise level: how far points scatter about the surface. See the CPU form. Counts the workgroups that fit sheets:
+// none where nothing is noisy. One invocation.
 //
-// Reads: surfels, sampled, quantiles. Writes: statistics.
+// Reads: surfels, sampled, quantiles, levels, depth_noise. Writes: statistics, arguments.
 
 #import frame
+#import depth_noise
+#import levels
 #import noise
+#import put_work
 #import quantiles
 #import surfel
 
@@ -11,6 +15,12 @@
 @group(0) @binding(2) var<storage, read> sampled: array<u32>;
 @group(0) @binding(3) var<storage, read> quantiles: array<Quantile>;
 @group(0) @binding(4) var<storage, read_write> statistics: FrameStatistics;
+@group(0) @binding(5) var<storage, read> levels: array<Level>;
+@group(0) @binding(6) var<storage, read> depth_noise: array<DepthRun>;
+@group(0) @binding(7) var<storage, read_write> arguments: array<Dispatch>;
+
+// Cells of a workgroup that fits sheets.
+override ITEMS_PER_GROUP: u32;
 
 // Noise level of a part of the sample with about the same density; 0 if the part is too small.
 fn scatter_level(part: u32) -> f32 {
@@ -86,6 +96,11 @@ fn noise_of_sample() -> Noise {
     return Noise(by_steady * all, 0.0, 0.0, sure);
 }
 
+// Whether the noise of any depths is known.
+fn any_known() -> bool {
+    return arrayLength(&depth_noise) > 1u || depth_noise[0].factor > 0.0;
+}
+
 @compute @workgroup_size(1)
 fn noise() {
     let found = noise_of_sample();
@@ -96,5 +111,10 @@ fn noise() {
     }
     let usual = select(0.0, middle, len >= LEAST_SAMPLE);
     let is_thick = noise_at(found, middle) > THICK_NOISE * usual;
-    statistics = FrameStatistics(found, usual, select(SHEET_LEVELS[0], SHEET_LEVELS[1], is_thick));
+    let sheet_level = select(SHEET_LEVELS[0], SHEET_LEVELS[1], is_thick);
+    statistics = FrameStatistics(found, usual, sheet_level);
+    let level = levels[sheet_level];
+    // Without a level no surfel asks for sheets.
+    let is_noisy = (found.level > 0.0 || any_known()) && level.side_px > 0u;
+    put_work(0u, select(0u, level.columns * level.rows, is_noisy), ITEMS_PER_GROUP);
 }

@@ -20,4 +20,7 @@ pub(crate) struct Pass {
     pub(super) label: String,
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) layout: wgpu::BindGroupLayout,
+    /// Whether the pass may write each binding.
+    #[cfg(test)]
+    pub(super) writes: Vec<bool>,
 }

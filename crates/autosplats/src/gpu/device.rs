@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::compiled::CompiledPasses;
+use super::pipeline_file::{PipelineFile, cache_folder};
 use crate::Error;
 
 /// A device that can render.
@@ -37,6 +38,8 @@ pub(crate) struct Gpu {
     lost: Arc<Mutex<Option<String>>>,
     /// Passes compiled so far, for all clones: a change of size or colour mode asks for most of them again.
     pub(super) compiled: Arc<Mutex<CompiledPasses>>,
+    /// Pipelines of earlier starts; `None` if the device does not hand them out.
+    pub(super) pipelines: Option<Arc<PipelineFile>>,
 }
 
 /// All devices that can render, hardware first.
@@ -155,7 +158,8 @@ impl Gpu {
     }
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self, Error> {
-        let optional = INT64_ATOMICS | wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::FLOAT32_BLENDABLE;
+        let timing = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
+        let optional = INT64_ATOMICS | timing | wgpu::Features::FLOAT32_BLENDABLE | wgpu::Features::PIPELINE_CACHE;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("autosplats"),
             required_features: adapter.features() & optional,
@@ -164,7 +168,11 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|error| Error::Device(format!("{} does not start: {error}", adapter.get_info().name)))?;
-        let gpu = Self::from_parts(device, queue);
+        let mut gpu = Self::from_parts(device, queue);
+        // Software compiles anew in any case.
+        if let (false, Some(folder)) = (gpu.is_software(), cache_folder()) {
+            gpu.pipelines = PipelineFile::open(&gpu.device, &folder).map(Arc::new);
+        }
         let reason = Arc::clone(&gpu.lost);
         gpu.device.set_device_lost_callback(move |_, message| {
             *reason.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
@@ -175,7 +183,12 @@ impl Gpu {
     /// Takes the caller's device and leaves its callback for loss alone; a loss is noticed when the device does not
     /// answer.
     pub(crate) fn from_parts(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        Self { device, queue, lost: Arc::default(), compiled: Arc::default() }
+        Self { device, queue, lost: Arc::default(), compiled: Arc::default(), pipelines: None }
+    }
+
+    /// Keeps the pipelines compiled so far for the next start. Without a file, that only starts more slowly.
+    pub(crate) fn store_pipelines(&self) {
+        let _ = self.pipelines.as_ref().map(|pipelines| pipelines.store());
     }
 
     /// Description of the device.

@@ -10,6 +10,7 @@ mod device;
 mod frame;
 mod link;
 mod pass;
+mod pipeline_file;
 mod raster;
 mod recorder;
 mod source;

@@ -37,9 +37,16 @@ impl Pass {
                 module: &made.shader,
                 entry_point: Some(source.entry_point()),
                 compilation_options: compilation_options(constants),
-                cache: None,
+                cache: gpu.pipelines.as_ref().map(|pipelines| pipelines.cache()),
             });
-            Self { path: source.path, label: label.clone(), pipeline, layout: made.layout }
+            Self {
+                path: source.path,
+                label: label.clone(),
+                pipeline,
+                layout: made.layout,
+                #[cfg(test)]
+                writes: entries.iter().map(is_written).collect(),
+            }
         })
     }
 
@@ -61,8 +68,28 @@ impl Pass {
             bindings: bind(gpu, &self.label, &self.layout, resources),
             groups: groups.into(),
         };
-        Step { path: self.path, label: self.label.clone(), work }
+        Step {
+            path: self.path,
+            label: self.label.clone(),
+            work,
+            #[cfg(test)]
+            uses: resources.iter().zip(&self.writes).filter_map(use_of).collect(),
+        }
     }
+}
+
+/// Whether a pass may write a binding.
+#[cfg(test)]
+fn is_written(entry: &wgpu::BindGroupLayoutEntry) -> bool {
+    let wgpu::BindingType::Buffer { ty, .. } = entry.ty else { return false };
+    ty == wgpu::BufferBindingType::Storage { read_only: false }
+}
+
+/// The buffer of a binding, with whether it may be written.
+#[cfg(test)]
+fn use_of((resource, writes): (&wgpu::BindingResource<'_>, &bool)) -> Option<(wgpu::Buffer, bool)> {
+    let wgpu::BindingResource::Buffer(bound) = resource else { return None };
+    Some((bound.buffer.clone(), *writes))
 }
 
 #[cfg(test)]

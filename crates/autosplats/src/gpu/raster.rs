@@ -140,7 +140,7 @@ impl RasterPass {
                     targets: &targets,
                 }),
                 multiview_mask: None,
-                cache: None,
+                cache: gpu.pipelines.as_ref().map(|pipelines| pipelines.cache()),
             });
             Self { path: source.path, label: label.clone(), pipeline, layout: made.layout }
         })

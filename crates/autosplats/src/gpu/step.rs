@@ -23,6 +23,9 @@ pub(crate) struct Step {
     pub(super) path: &'static str,
     pub(super) label: String,
     pub(super) work: StepWork,
+    /// Bound buffers, each with whether the pass may write it.
+    #[cfg(test)]
+    pub(crate) uses: Vec<(wgpu::Buffer, bool)>,
 }
 
 /// The work of a step.
@@ -33,12 +36,36 @@ pub(super) enum StepWork {
 }
 
 impl Step {
+    /// The stage of the pass: the first folder of its path.
+    pub(super) fn stage(&self) -> &'static str {
+        self.path.split('/').next().unwrap_or(self.path)
+    }
+}
+
+#[cfg(test)]
+impl Step {
+    /// Number of workgroups of a step that computes.
+    pub(crate) fn groups(&self) -> Option<&Groups> {
+        match &self.work {
+            StepWork::Compute { groups, .. } => Some(groups),
+            StepWork::Raster(_) => None,
+        }
+    }
+}
+
+impl Step {
     /// Draws in this order, as one step with the name of the last draw.
     ///
     /// # Panics
     /// If there is nothing to draw.
     pub(crate) fn draw(targets: Targets, draws: Vec<Draw>) -> Self {
         let [.., last] = &draws[..] else { panic!("a step that draws nothing") };
-        Self { path: last.path, label: last.label.clone(), work: StepWork::Raster(Raster { targets, draws }) }
+        Self {
+            path: last.path,
+            label: last.label.clone(),
+            work: StepWork::Raster(Raster { targets, draws }),
+            #[cfg(test)]
+            uses: Vec::new(),
+        }
     }
 }

@@ -1,9 +1,11 @@
-// Empties keys, density cells, counters, sixteenths and the cells around the eye for a new frame.
+// Empties for a new frame what its passes add to: keys, density cells, counters, sixteenths, the cells around the eye,
+// the depth map and the centres of splats.
 //
-// Writes: keys, density, counters, sixteenths, near.
+// Writes: keys, density, counters, sixteenths, near, depth_map, centers.
 
 #import frame
 #import density
+#import depth_map
 #import groups
 #import keys
 
@@ -12,6 +14,8 @@
 @group(0) @binding(3) var<storage, read_write> counters: array<u32>;
 @group(0) @binding(4) var<storage, read_write> sixteenths: array<u32>;
 @group(0) @binding(5) var<storage, read_write> near: array<u32>;
+@group(0) @binding(6) var<storage, read_write> depth_map: array<u32>;
+@group(0) @binding(7) var<storage, read_write> centers: array<u32>;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn clear(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -30,5 +34,9 @@ fn clear(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     if index < NEAR_CELLS {
         near[index] = 0u;
+    }
+    if index < arrayLength(&depth_map) {
+        depth_map[index] = depth_key(infinity());
+        centers[index] = 0u;
     }
 }

@@ -8,6 +8,7 @@
 #import keys
 #import names
 #import rank
+#import sum_before
 
 @group(0) @binding(1) var<storage, read> keys: array<Key>;
 @group(0) @binding(2) var<storage, read> counters: array<u32>;
@@ -32,7 +33,7 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         }
     }
     rank_finish(local);
-    let before = block_sums[block];
+    let before = sum_before(block, local);
     for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
         let flag = step * LARGE_GROUP + local;
         let at = block * RANK_BLOCK_FLAGS + flag;
@@ -52,6 +53,6 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     if block == 0u && local == 0u {
         // The end of the last cell.
         let strips = (frame.size.y + strip_px - 1u) / strip_px;
-        cell_start[strips * frame.size.x] = counters[VISIBLE];
+        cell_start[strips * frame.size.x] = counters[NEAR_FIRST];
     }
 }

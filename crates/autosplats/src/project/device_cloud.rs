@@ -11,10 +11,12 @@ use crate::Error;
 use crate::gpu::Gpu;
 use crate::points::Points;
 
-/// Points uploaded at a time.
+/// Points of a piece, which a thread writes into a staging buffer of its own.
 const UPLOAD_PIECE_POINTS: usize = 1 << 18;
-/// Number of staging buffers, each of one piece of positions. The host fills one while others are in transit.
-const STAGING_BUFFER_COUNT: usize = 8;
+/// Most pieces that are written side by side and copied by one submission: a load.
+const PIECES_PER_LOAD: usize = 8;
+/// Loads under way. The host writes one while the device copies another.
+const LOADS: usize = 2;
 /// Words of a [`DeviceSlot`].
 const SLOT_WORDS: usize = size_of::<DeviceSlot>() / size_of::<f32>();
 /// Buffers are reallocated when a cloud uses less than one in this many of their points.
@@ -34,19 +36,18 @@ impl PointValues<'_> {
         usize::from(self.colors.is_some()) + usize::from(self.scalar.is_some())
     }
 
-    /// Packs the values of the points from index `first` on.
-    fn pack(&self, first: usize, out: &mut [u32]) {
-        let words = self.words();
-        out.par_chunks_mut(words).enumerate().with_min_len(1 << 12).for_each(|(at, out)| {
-            let mut out = out.iter_mut();
-            let mut put = |word: u32| out.next().map(|out| *out = word).unwrap_or_default();
-            if let Some([r, g, b]) = self.colors.map(|colors| colors[first + at]) {
-                put(u32::from_le_bytes([r, g, b, 0]));
+    /// Writes the values of the points at `points`.
+    fn write(&self, points: Range<usize>, to: wgpu::WriteOnly<'_, [u8]>) {
+        let color = |&[r, g, b]: &[u8; 3]| u32::from_le_bytes([r, g, b, 0]).to_ne_bytes();
+        let (words, _) = to.into_chunks::<4>();
+        match (self.colors, self.scalar) {
+            (Some(colors), None) => words.write_iter(colors[points].iter().map(color)),
+            (None, Some(scalar)) => words.write_iter(points.map(|at| scalar.get(at).to_ne_bytes())),
+            (Some(colors), Some(scalar)) => {
+                words.write_iter(points.flat_map(|at| [color(&colors[at]), scalar.get(at).to_ne_bytes()]));
             }
-            if let Some(scalar) = self.scalar {
-                put(scalar.get(first + at).to_bits());
-            }
-        });
+            (None, None) => {}
+        }
     }
 }
 
@@ -224,27 +225,33 @@ impl DeviceCloud {
     }
 }
 
-/// Copies clouds to the device through a ring of staging buffers, which bounds the memory in transit.
-#[derive(Debug)]
+/// Copies clouds to the device through staging buffers, which bound the memory in transit.
+///
+/// Such a buffer may be memory of the device behind the bus, which one thread cannot fill as fast as the bus takes it.
+#[derive(Debug, Default)]
 pub(crate) struct Uploader {
-    ring: Vec<Staging>,
+    loads: [Load; LOADS],
     next: usize,
-    packed: Vec<u32>,
 }
 
-/// A staging buffer.
-#[derive(Debug)]
-struct Staging {
-    buffer: wgpu::Buffer,
-    /// Submission that last copied from the buffer.
+/// The staging buffers of a load, each of one piece of positions.
+#[derive(Debug, Default)]
+struct Load {
+    buffers: Vec<wgpu::Buffer>,
+    /// Submission that last copied from the buffers.
     submitted: Option<wgpu::SubmissionIndex>,
 }
 
-impl Uploader {
-    pub(crate) fn new() -> Self {
-        Self { ring: Vec::new(), next: 0, packed: Vec::new() }
-    }
+/// A piece to be copied.
+struct Piece<'a> {
+    to: &'a wgpu::Buffer,
+    /// Index of the first point in `to`.
+    at: usize,
+    /// Indices of the points in the cloud.
+    points: Range<usize>,
+}
 
+impl Uploader {
     /// Uploads the positions at `written` indices.
     ///
     /// # Errors
@@ -258,13 +265,11 @@ impl Uploader {
         to: &DeviceCloud,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
-        let mut done = Done::new(written, report);
-        for (chunk, at, points) in to.pieces(written) {
-            let bytes = bytemuck::cast_slice(&positions[points.clone()]);
-            self.write(gpu, &chunk.positions, at * size_of::<[f32; 3]>(), bytes)?;
-            done.add(points.len())?;
-        }
-        gpu.check_lost()
+        let pieces = to.pieces(written).map(|(chunk, at, points)| Piece { to: &chunk.positions, at, points });
+        let write = |points: Range<usize>, mut to: wgpu::WriteOnly<'_, [u8]>| {
+            to.copy_from_slice(bytemuck::cast_slice(&positions[points]));
+        };
+        self.upload(gpu, pieces.collect(), size_of::<[f32; 3]>(), &write, &mut Done::new(written, report))
     }
 
     /// Uploads the values at `written` indices.
@@ -279,43 +284,68 @@ impl Uploader {
         to: &DeviceCloud,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
-        let mut done = Done::new(written, report);
-        for (chunk, at, points) in to.pieces(written).filter(|_| to.words > 0) {
-            let mut packed = std::mem::take(&mut self.packed);
-            packed.resize(points.len() * to.words, 0);
-            values.pack(points.start, &mut packed);
-            self.write(gpu, &chunk.values, at * to.words * size_of::<u32>(), bytemuck::cast_slice(&packed))?;
-            self.packed = packed;
-            done.add(points.len())?;
+        let pieces = to.pieces(written).filter(|_| to.words > 0);
+        let pieces = pieces.map(|(chunk, at, points)| Piece { to: &chunk.values, at, points });
+        let write = |points: Range<usize>, to: wgpu::WriteOnly<'_, [u8]>| values.write(points, to);
+        self.upload(gpu, pieces.collect(), to.words * size_of::<u32>(), &write, &mut Done::new(written, report))
+    }
+
+    /// Uploads pieces; `write` writes the points of an index range, each of `point_bytes`.
+    fn upload(
+        &mut self,
+        gpu: &Gpu,
+        pieces: Vec<Piece<'_>>,
+        point_bytes: usize,
+        write: &(dyn Fn(Range<usize>, wgpu::WriteOnly<'_, [u8]>) + Sync),
+        done: &mut Done<'_>,
+    ) -> Result<(), Error> {
+        for pieces in pieces.chunks(PIECES_PER_LOAD) {
+            // The next load is the oldest, so this waits only if the device is slower than the host.
+            self.next = (self.next + 1) % LOADS;
+            self.loads[self.next].copy(gpu, pieces, point_bytes, write)?;
+            done.add(pieces.iter().map(|piece| piece.points.len()).sum())?;
         }
         gpu.check_lost()
     }
+}
 
-    /// Copies up to a piece of bytes through the next staging buffer of the ring.
-    fn write(&mut self, gpu: &Gpu, to: &wgpu::Buffer, at: usize, bytes: &[u8]) -> Result<(), Error> {
+impl Load {
+    /// Writes pieces side by side, and submits their copies.
+    fn copy(
+        &mut self,
+        gpu: &Gpu,
+        pieces: &[Piece<'_>],
+        point_bytes: usize,
+        write: &(dyn Fn(Range<usize>, wgpu::WriteOnly<'_, [u8]>) + Sync),
+    ) -> Result<(), Error> {
         let lost = || gpu.check_lost().err().unwrap_or_else(|| Error::DeviceLost("it takes no points".into()));
-        if self.ring.len() < STAGING_BUFFER_COUNT {
+        while self.buffers.len() < pieces.len() {
             let usage = wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC;
             let size = (UPLOAD_PIECE_POINTS * size_of::<[f32; 3]>()) as u64;
-            self.ring.push(Staging { buffer: gpu.buffer("staging", size, usage)?, submitted: None });
-            self.next = self.ring.len() - 1;
+            self.buffers.push(gpu.buffer("staging", size, usage)?);
         }
-        let Staging { buffer, submitted } = &mut self.ring[self.next];
-        self.next = (self.next + 1) % STAGING_BUFFER_COUNT;
-        let size = bytes.len() as u64;
-        // The next buffer is the oldest of the ring, so this waits only if the device is slower than the host.
-        buffer.map_async(wgpu::MapMode::Write, 0..size, |_| {});
-        let poll = match submitted.take() {
+        let bytes_of = |piece: &Piece<'_>| (piece.points.len() * point_bytes) as u64;
+        for (piece, buffer) in pieces.iter().zip(&self.buffers) {
+            buffer.map_async(wgpu::MapMode::Write, 0..bytes_of(piece), |_| {});
+        }
+        let poll = match self.submitted.take() {
             Some(submitted) => wgpu::PollType::Wait { submission_index: Some(submitted), timeout: None },
             None => wgpu::PollType::Poll,
         };
         gpu.device.poll(poll).map_err(|_| lost())?;
-        buffer.get_mapped_range_mut(0..size).map_err(|_| lost())?.copy_from_slice(bytes);
-        buffer.unmap();
+        pieces.par_iter().zip(&self.buffers).try_for_each(|(piece, buffer)| {
+            let mut mapped = buffer.get_mapped_range_mut(0..bytes_of(piece)).map_err(|_| lost())?;
+            write(piece.points.clone(), mapped.slice(..));
+            drop(mapped);
+            buffer.unmap();
+            Ok::<_, Error>(())
+        })?;
         let mut encoder =
             gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("autosplats.upload") });
-        encoder.copy_buffer_to_buffer(buffer, 0, to, at as u64, size);
-        *submitted = Some(gpu.queue.submit([encoder.finish()]));
+        for (piece, buffer) in pieces.iter().zip(&self.buffers) {
+            encoder.copy_buffer_to_buffer(buffer, 0, piece.to, (piece.at * point_bytes) as u64, bytes_of(piece));
+        }
+        self.submitted = Some(gpu.queue.submit([encoder.finish()]));
         Ok(())
     }
 }

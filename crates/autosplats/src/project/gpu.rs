@@ -12,9 +12,11 @@ const LIBRARY: Library = Library {
         "active",
         "add_sixteenth",
         "cell_order",
+        "cell_sizes",
         "count_dropped",
         "count_near",
         "keys",
+        "list_near",
         "near_cells",
         "near_points"
     ]],
@@ -26,7 +28,7 @@ const LIBRARY: Library = Library {
             FACE_CELLS, FIRST_OCTAVE, LISTED_OCTAVES, MOST_NEAR, NEAR_CELLS, NEAR_POINTS, NEAR_REACH, OCTAVES,
             SPARSE_POINTS
         ),
-        constants![ENTRY_WORDS, MARGIN_REACH, RANK_BLOCK_FLAGS],
+        constants![ENTRY_WORDS, LARGE_SPLAT_GROUPS, MARGIN_REACH, RANK_BLOCK_FLAGS],
     ],
 };
 
@@ -36,11 +38,8 @@ passes! {
     PROJECT = "project" needs INT64_ATOMICS,
     PROJECT_32 = "project_32",
     OCCUPANCY = "occupancy",
-    GRID = "grid",
     COUNT = "count",
-    SCAN = "scan",
     COMPACT = "compact",
-    LIST_NEAR = "list_near",
     GATHER = "gather",
     SPLIT_COUNT = "split_count",
     SPLIT = "split",
@@ -49,7 +48,8 @@ passes! {
 
 indices! {
     /// Indirect dispatches whose number of workgroups depends on counters. A variant names the items and how many a
-    /// workgroup takes; `Blocks` are blocks of [`RANK_BLOCK_FLAGS`].
+    /// workgroup takes; `Blocks` are blocks of [`RANK_BLOCK_FLAGS`]. `Drawn` are queries whose splats are drawn, 256 a
+    /// workgroup, after [`LARGE_SPLAT_GROUPS`].
     pub(crate) enum Work {
         Visible256,
         VisibleBlocks,
@@ -59,7 +59,9 @@ indices! {
         Recovered64,
         Recovered256,
         Queries256,
-        LargeSplats,
+        ActiveDrawn,
+        RecoveredDrawn,
+        QueriesDrawn,
         LeftActive64,
         LeftRecovered64,
         ActiveFew,
@@ -83,6 +85,11 @@ impl Round {
         [Work::Active64, Work::Recovered64][self as usize]
     }
 
+    /// Dispatch that draws the splats of the round.
+    pub(crate) fn work_drawn(self) -> Work {
+        [Work::ActiveDrawn, Work::RecoveredDrawn][self as usize]
+    }
+
     /// Dispatch for the queries that one pass of the search leaves to another, 64 per workgroup.
     pub(crate) fn left_64(self) -> Work {
         [Work::LeftActive64, Work::LeftRecovered64][self as usize]
@@ -100,10 +107,17 @@ pub(crate) fn few(gpu: &Gpu) -> u32 {
     if gpu.is_software() { 16 } else { 4 }
 }
 
+/// The constant by which passes know [`few`].
+pub(crate) fn few_constant(gpu: &Gpu) -> (&'static str, f64) {
+    ("ITEMS_PER_GROUP", few(gpu).into())
+}
+
 /// Words of an entry of a cell around the eye: ordinal and position of a point.
 const ENTRY_WORDS: usize = 4;
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = crate::gpu::LARGE_GROUP;
+/// Workgroups that take the large splats from their list, in front of those for all others.
+pub(crate) const LARGE_SPLAT_GROUPS: u32 = 128;
 /// Flags that one workgroup ranks: a block.
 pub(crate) const RANK_BLOCK_FLAGS: u32 = 2048;
 
@@ -195,8 +209,13 @@ pub(crate) struct ScreenBuffers {
     /// Queries of a round that one pass of the search leaves to another.
     pub(crate) left: wgpu::Buffer,
     pub(crate) block_sums: wgpu::Buffer,
-    /// Workgroup counts of each [`Work`], three `u32` each.
-    arguments: wgpu::Buffer,
+    /// Depth per pixel, pushed back by ε, row by row, as `shared/depth_map.wgsl` has it; infinite where nothing is.
+    pub(crate) depth: wgpu::Buffer,
+    /// Centres of splats in each pixel, row by row (`splat/centers.rs`).
+    pub(crate) centers: wgpu::Buffer,
+    /// Workgroup counts of each [`Work`], three `u32` each: those that `count` tells, those that `split` tells, and the
+    /// others. A pass cannot write the buffer that has its own count.
+    pub(crate) arguments: [wgpu::Buffer; 3],
 }
 
 impl ScreenBuffers {
@@ -214,6 +233,10 @@ impl ScreenBuffers {
         let pixels = width * height;
         let slots = slots(size, halves);
         let capacity = capacity(size, halves, points);
+        let arguments = || {
+            let bytes = Work::CONSTANTS.len() as u64 * DISPATCH_BYTES;
+            gpu.buffer("arguments", bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT)
+        };
         Ok(Self {
             size,
             halves,
@@ -237,17 +260,20 @@ impl ScreenBuffers {
             left: gpu.storage::<u32>("queries left", capacity)?,
             block_sums: gpu
                 .storage::<u32>("sums of blocks", slots.max(capacity).div_ceil(RANK_BLOCK_FLAGS as usize))?,
-            arguments: gpu.buffer(
-                "arguments",
-                Work::CONSTANTS.len() as u64 * DISPATCH_BYTES,
-                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
-            )?,
+            depth: gpu.storage::<u32>("depth map", pixels)?,
+            centers: gpu.storage::<u32>("centres of splats", pixels)?,
+            arguments: [arguments()?, arguments()?, arguments()?],
         })
     }
 
-    /// Number of workgroups of `work` that [`WorkPass`] computed last.
+    /// Number of workgroups of `work`, as the device computed it last.
     pub(crate) fn groups(&self, work: Work) -> Groups {
-        Groups::Counted(self.arguments.clone(), work as u64 * DISPATCH_BYTES)
+        let told = match work {
+            Work::Visible256 | Work::VisibleBlocks => 0,
+            Work::PassiveBlocks | Work::Active64 | Work::Active256 | Work::ActiveFew | Work::ActiveDrawn => 1,
+            _ => 2,
+        };
+        Groups::Counted(self.arguments[told].clone(), work as u64 * DISPATCH_BYTES)
     }
 }
 
@@ -261,7 +287,8 @@ fn capacity(size: [u32; 2], halves: bool, points: usize) -> usize {
     points.min(slots(size, halves)) + points.min(near::MOST_NEAR)
 }
 
-/// Computes the number of workgroups of each [`Work`].
+/// Computes the number of workgroups of each [`Work`], where counters change in other passes than those that compute it
+/// themselves.
 #[derive(Debug)]
 pub(crate) struct WorkPass(Pass);
 
@@ -269,23 +296,20 @@ impl WorkPass {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Pass::new(gpu, &WORK, &[("ITEMS_PER_GROUP", few(gpu).into())]).map(Self)
+        Pass::new(gpu, &WORK, &[few_constant(gpu)]).map(Self)
     }
 
-    /// The step to run after counters have changed.
+    /// The step to run after counters of the search have changed.
     pub(crate) fn step(&self, gpu: &Gpu, frame: &wgpu::Buffer, screen: &ScreenBuffers) -> Step {
-        self.0.step(gpu, &[frame, &screen.counters, &screen.arguments], 1)
+        let [.., last] = &screen.arguments;
+        self.0.step(gpu, &[frame, &screen.counters, last], 1)
     }
-}
 
-/// The pass that scans the sums of blocks: of all blocks, or of the blocks of as many items as counter `scanned` says.
-/// The sum goes to counter `total`.
-///
-/// # Errors
-/// [`Error::Device`].
-pub(crate) fn scan_pass(gpu: &Gpu, total: Counter, scanned: Option<Counter>) -> Result<Pass, Error> {
-    let scanned = scanned.unwrap_or(total);
-    Pass::new(gpu, &SCAN, &[("TOTAL", f64::from(total as u32)), ("SCANNED", f64::from(scanned as u32))])
+    /// The steps to run after the host has written counters, for tests.
+    #[cfg(test)]
+    fn steps_all(&self, gpu: &Gpu, frame: &wgpu::Buffer, screen: &ScreenBuffers) -> [Step; 3] {
+        screen.arguments.each_ref().map(|arguments| self.0.step(gpu, &[frame, &screen.counters, arguments], 1))
+    }
 }
 
 /// The way each pixel finds its nearest point.
@@ -333,16 +357,11 @@ pub(crate) struct ProjectPasses {
     clear: Pass,
     nearest: NearestPass,
     occupancy: Pass,
-    grid: Pass,
     count: Pass,
-    scan_visible: Pass,
     compact: Pass,
-    list_near: Pass,
     gather: Pass,
     split_count: Pass,
-    scan_active: Pass,
     split: Pass,
-    work: WorkPass,
 }
 
 impl ProjectPasses {
@@ -356,16 +375,11 @@ impl ProjectPasses {
             clear: pass(&CLEAR)?,
             nearest: NearestPass::new(gpu, int64)?,
             occupancy: pass(&OCCUPANCY)?,
-            grid: pass(&GRID)?,
             count: pass(&COUNT)?,
-            scan_visible: scan_pass(gpu, Counter::Visible, None)?,
             compact: pass(&COMPACT)?,
-            list_near: pass(&LIST_NEAR)?,
             gather: pass(&GATHER)?,
             split_count: pass(&SPLIT_COUNT)?,
-            scan_active: scan_pass(gpu, Counter::Active, Some(Counter::Visible))?,
-            split: pass(&SPLIT)?,
-            work: WorkPass::new(gpu)?,
+            split: Pass::new(gpu, &SPLIT, &[few_constant(gpu)])?,
         })
     }
 
@@ -380,26 +394,23 @@ impl ProjectPasses {
         // Without room there are no points.
         let Some(names) = cloud.names() else { return Vec::new() };
         let ScreenBuffers { counters, keys, near, density, cell_start, sixteenths, .. } = screen;
-        let ScreenBuffers { source, pixels, points, values, block_sums, .. } = screen;
+        let ScreenBuffers { source, pixels, points, values, block_sums, depth, centers, arguments, .. } = screen;
         let [width, height] = screen.size;
         let slots = (width * height) << u32::from(screen.halves);
         let slot_blocks = slots.div_ceil(RANK_BLOCK_FLAGS);
         let cleared = slots.max(near::NEAR_CELLS as u32);
-        let mut steps =
-            vec![self.clear.step(gpu, &[frame, keys, density, counters, sixteenths, near], cleared.div_ceil(GROUP))];
+        let clear = [frame, keys, density, counters, sixteenths, near, depth, centers];
+        let mut steps = vec![self.clear.step(gpu, &clear, cleared.div_ceil(GROUP))];
         steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
         const BLOCK_PX: u32 = cpu::OCCUPANCY_BLOCK_PX as u32;
         let covered_blocks = width.div_ceil(BLOCK_PX) * height.div_ceil(BLOCK_PX);
         steps.push(self.occupancy.step(gpu, &[frame, keys, counters], covered_blocks));
-        steps.push(self.grid.step(gpu, &[frame, counters], 1));
         // Blocks beyond the slots, which only hold points of sparse cells, count none.
         let blocks = slots.max(screen.capacity).div_ceil(RANK_BLOCK_FLAGS);
-        steps.push(self.count.step(gpu, &[frame, keys, counters, block_sums, density], blocks));
-        steps.push(self.scan_visible.step(gpu, &[frame, block_sums, counters], 1));
+        let count = [frame, keys, counters, block_sums, density, near, source, names, &arguments[0]];
+        steps.push(self.count.step(gpu, &count, 1 + blocks));
         let compact = [frame, keys, counters, block_sums, source, pixels, cell_start, names];
         steps.push(self.compact.step(gpu, &compact, slot_blocks));
-        steps.push(self.list_near.step(gpu, &[frame, near, counters, source, names], 1));
-        steps.push(self.work.step(gpu, frame, screen));
         for chunk in cloud.chunks() {
             let Chunk { uniform, positions, values: stored, .. } = chunk;
             let gather = [frame, uniform, positions, stored, counters, source, pixels, points, values, near];
@@ -410,10 +421,8 @@ impl ProjectPasses {
             &[frame, points, density, counters, block_sums],
             screen.groups(Work::VisibleBlocks),
         ));
-        steps.push(self.scan_active.step(gpu, &[frame, block_sums, counters], 1));
-        let split = [frame, points, density, counters, block_sums, &screen.queries, &screen.passive];
+        let split = [frame, points, density, counters, block_sums, &screen.queries, &screen.passive, &arguments[1]];
         steps.push(self.split.step(gpu, &split, screen.groups(Work::VisibleBlocks)));
-        steps.push(self.work.step(gpu, frame, screen));
         steps
     }
 }

@@ -35,7 +35,7 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     }
     workgroupBarrier();
     if local == 0u && atomicLoad(&owned) > 0u {
-        atomicAdd(&counters[VISIBLE], atomicLoad(&owned));
+        atomicAdd(&counters[NEAR_FIRST], atomicLoad(&owned));
         atomicAdd(&counters[BLOCKS], 1u);
     }
 }

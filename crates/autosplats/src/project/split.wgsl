@@ -1,13 +1,16 @@
 // Lists the active and the passive screen points, both ascending [Paper, §7, Grid Culling].
 //
-// Reads: points, density, block_sums. Writes: queries, passive, counters.
+// Reads: points, density, block_sums. Reads and writes: counters. Writes: queries, passive, arguments. The last block
+// tells the numbers of points.
 
 #import frame
 #import active
 #import density
 #import groups
+#import put_rounds
 #import rank
 #import screen
+#import sum_before
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> density: array<DensityCell>;
@@ -15,6 +18,7 @@
 @group(0) @binding(4) var<storage, read> block_sums: array<u32>;
 @group(0) @binding(5) var<storage, read_write> queries: array<u32>;
 @group(0) @binding(6) var<storage, read_write> passive: array<u32>;
+@group(0) @binding(7) var<storage, read_write> arguments: array<Dispatch>;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -37,7 +41,7 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         }
     }
     rank_finish(local);
-    let active_before = block_sums[block];
+    let active_before = sum_before(block, local);
     for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
         let flag = step * LARGE_GROUP + local;
         let index = block * RANK_BLOCK_FLAGS + flag;
@@ -50,7 +54,12 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
             }
         }
     }
-    if block == 0u && local == 0u {
-        counters[PASSIVE] = visible - counters[ACTIVE];
+    if block == (max(visible, 1u) - 1u) / RANK_BLOCK_FLAGS && local == 0u {
+        let active_len = active_before + block_sums[block];
+        counters[ACTIVE] = active_len;
+        counters[PASSIVE] = visible - active_len;
+        put_active(active_len);
+        // One block at least: the last tells how many points are recovered.
+        put_work(PASSIVE_BLOCKS, max(visible - active_len, 1u), RANK_BLOCK_FLAGS);
     }
 }

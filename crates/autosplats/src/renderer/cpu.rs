@@ -304,7 +304,7 @@ impl CpuFrame<'_> {
         let values = layers.scalar_about;
         let scene = Scene {
             view: &self.picture,
-            up: upward.of(cloud),
+            up: upward.of(cloud, &shading.color),
             origin: cloud.origin(),
             unit: self.unit,
             exposure,

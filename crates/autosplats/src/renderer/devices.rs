@@ -49,6 +49,21 @@ impl Renderer {
         }
     }
 
+    /// Says whether [`Frame::passes`](super::Frame::passes) has each pass of a GPU by itself. Such frames take longer,
+    /// because the device then finishes each pass before it begins the next. Default: no.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// let mut renderer = autosplats::Renderer::new();
+    /// renderer.time_passes(true);
+    /// ```
+    pub fn time_passes(&mut self, each: bool) {
+        if let BackendRenderer::Gpu(renderer) = &mut self.form {
+            renderer.time_passes(each);
+        }
+    }
+
     /// The device that renders; `None` on the CPU.
     pub fn adapter(&self) -> Option<AdapterSummary> {
         match &self.form {

@@ -38,6 +38,8 @@ pub(super) struct GpuRenderer {
     gpu: Gpu,
     /// How frames in memory are timed. Frames in textures are not timed.
     clock: Clock,
+    /// Whether each pass of a frame in memory is timed by itself.
+    times_passes: bool,
     uploader: Uploader,
     cloud: DeviceCloud,
     /// Buffer of the sensor positions of the points, and its number of runs of points.
@@ -82,7 +84,8 @@ impl GpuRenderer {
     pub(super) fn new(gpu: Gpu) -> Result<Self, Error> {
         Ok(Self {
             clock: Clock::new(&gpu),
-            uploader: Uploader::new(),
+            times_passes: false,
+            uploader: Uploader::default(),
             cloud: DeviceCloud::default(),
             sensors: None,
             depth_noise: DepthNoiseBuffer::new(&gpu)?,
@@ -103,6 +106,11 @@ impl GpuRenderer {
 
     pub(super) fn adapter(&self) -> AdapterSummary {
         self.gpu.summary()
+    }
+
+    /// See [`Renderer::time_passes`](super::Renderer::time_passes).
+    pub(super) fn time_passes(&mut self, each: bool) {
+        self.times_passes = each;
     }
 
     /// Checks that the device can run the engine.
@@ -193,7 +201,7 @@ impl GpuRenderer {
         let (Some(prepared), Some(view)) = (prepared, view) else { return Ok(Vec::new()) };
         gpu.checked(|| {
             let mut recorder = Recorder::new(gpu, &Clock::Off);
-            readback.copy(gpu, &mut recorder.encoder, &[&prepared.screen.counters, &prepared.surfels])?;
+            readback.copy(gpu, recorder.encoder(), &[&prepared.screen.counters, &prepared.surfels])?;
             recorder.finish();
             readback.read(gpu, |parts| {
                 let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
@@ -212,7 +220,7 @@ impl GpuRenderer {
         let Some(Prepared { convergence: Some(buffer), .. }) = prepared else { return Ok(Vec::new()) };
         gpu.checked(|| {
             let mut recorder = Recorder::new(gpu, &Clock::Off);
-            readback.copy(gpu, &mut recorder.encoder, &[buffer])?;
+            readback.copy(gpu, recorder.encoder(), &[buffer])?;
             recorder.finish();
             readback.read(gpu, |parts| convergence(&bytemuck::pod_collect_to_vec::<u8, u32>(parts[0])))
         })?
@@ -250,25 +258,44 @@ impl GpuRenderer {
         let rules = self.prepare(points, view, &wanted, settings)?;
         let screen = &view.with_margin(rules.margin_px);
         let Self {
-            gpu, clock, prepared, upward, exposure, view: last_view, readback, image, layers, times, frame, ..
+            gpu,
+            clock,
+            times_passes,
+            prepared,
+            upward,
+            exposure,
+            view: last_view,
+            readback,
+            image,
+            layers,
+            times,
+            frame,
+            ..
         } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let cloud = points.scene();
         let exposure = exposure.of(cloud, &settings.shading);
         let values = wanted.scalar(points).map(|values| values.about()).unwrap_or_default();
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
+        let scene = Scene {
+            view,
+            up: upward.of(cloud, &settings.shading.color),
+            origin: cloud.origin(),
+            unit,
+            exposure,
+            values,
+        };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         prepared.write_uniforms(gpu, frame, (screen, points, None), &rules, settings, &uniform);
 
         let waited = Instant::now();
-        let mut recorder = Recorder::new(gpu, clock);
+        let mut recorder = Recorder::new(gpu, clock).timing_each(*times_passes);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         let mut wants = vec![&prepared.screen.counters, &prepared.picture.image];
         if settings.all_layers {
             let LayerBuffers { surface, cover, extras, .. } = &prepared.layers;
             wants.extend([&prepared.picture.linear, surface, cover, extras]);
         }
-        readback.copy(gpu, &mut recorder.encoder, &wants)?;
+        readback.copy(gpu, recorder.encoder(), &wants)?;
         *times = recorder.finish();
         // The submitted frame replaces the surfels of the last one.
         *last_view = Some(*screen);
@@ -339,14 +366,21 @@ impl GpuRenderer {
         let cloud = points.scene();
         let exposure = exposure.of(cloud, &settings.shading);
         let values = wanted.scalar(points).map(|values| values.about()).unwrap_or_default();
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), unit, exposure, values };
+        let scene = Scene {
+            view,
+            up: upward.of(cloud, &settings.shading.color),
+            origin: cloud.origin(),
+            unit,
+            exposure,
+            values,
+        };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let format = texture.format();
         let now = (&screen, points, Some(format));
         prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform.into_format(format));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
-        prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
+        prepared.picture.copy_to_texture(recorder.encoder(), texture)?;
         recorder.finish();
         *last_view = Some(screen);
         prepared.seen = Some((points.placed(screen), points.identity(), (settings.clone(), Some(format))));

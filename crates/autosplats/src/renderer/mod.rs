@@ -74,8 +74,8 @@ pub struct Counts {
     pub value_range: Option<[f64; 2]>,
 }
 
-/// Milliseconds spent in each stage of one frame. On a GPU with timestamps, the time of a stage includes that between
-/// its successive passes.
+/// Milliseconds spent in each stage of one frame. On a GPU, the time of a stage includes that between its successive
+/// passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs, reason = "one field per stage")]
 pub struct Timings {
@@ -159,7 +159,7 @@ pub struct Frame<'a> {
     pub counts: Counts,
     /// Time per stage.
     pub timings: Timings,
-    /// Time per pass, in order; empty on the CPU.
+    /// Time per run of passes of a stage, in order, or per [single pass](Renderer::time_passes); empty on the CPU.
     pub passes: &'a [PassTime],
 }
 

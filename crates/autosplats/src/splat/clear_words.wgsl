@@ -1,5 +1,4 @@
-// Sets all words of a buffer to 0. Cleared are the marked cells before refinement, the centres before the trim, and the
-// halves of pixels before a frame is kept.
+// Sets all words of a buffer to 0: the halves of pixels before a frame is kept.
 //
 // Writes: words.
 

@@ -1,10 +1,10 @@
 //! Splatting on the GPU.
 //!
 //! # How it works
-//! The depth map takes minima, which do not depend on the order. An invocation draws a splat, a workgroup draws a large
-//! one, by atomic minima of integers that order as depths do. Few splats die in a refinement, and most of them were
-//! hidden. So refinement erases their depths from the map, and redraws only splats that meet a cell of 8×8 pixels with
-//! erased depths (`imports/redraw.wgsl`).
+//! The depth map takes minima, which do not depend on the order. An invocation draws a splat, a team of 64 a large one,
+//! by atomic minima of integers that order as depths do. Few splats die in a refinement, and most of them were hidden.
+//! So refinement erases their depths from the map, and redraws only splats that meet a cell of 8×8 pixels with erased
+//! depths (`imports/redraw.wgsl`).
 //!
 //! Attributes are sums, which have to equal those of the CPU and be the same each time. So a pixel draws its splats in
 //! list order. A workgroup per patch of 16×32 pixels finds them by a tree over the list instead of bins
@@ -18,19 +18,20 @@ use super::{centers, raster, setup};
 use crate::Error;
 use crate::adapt::FrameStatistics;
 use crate::fit::{SUPPORT, Surfel};
-use crate::gpu::{Gpu, LARGE_GROUP, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
+use crate::gpu::{Gpu, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
 use crate::project::MARGIN_REACH;
-use crate::project::gpu::{Counter, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, WorkPass, scan_pass};
+use crate::project::gpu::{Counter, LARGE_SPLAT_GROUPS, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, few_constant};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
     files: &[files![
         "blocks",
         "blurred",
-        "depth_map",
+        "draw_depth",
         "erased",
         "fragment",
         "hidden",
+        "large",
         "marked",
         "patch",
         "recovered",
@@ -39,6 +40,7 @@ const LIBRARY: Library = Library {
     ]],
     constants: &[
         Counter::CONSTANTS,
+        Work::CONSTANTS,
         constants!(in blurred:
             BLOCK_PX, BLOCKS_BEYOND_FRINGE, BLURRING_NOISE_SHARE, FRINGE_BLOCKS, FRINGE_NOISES, FULL_NOISE_SINE,
             HALF_WAY_OFFSET_SHARE, MAX_BLURRED_OFFSET, MAX_PIXEL_WINDOW_PX, MAX_WINDOW_PX, MIN_BLURRING_NOISE_PX,
@@ -62,7 +64,8 @@ const LIBRARY: Library = Library {
             LINES = LINES.len(),
             OWN_SIXTEENTHS = [OWN_SIXTEENTHS as u32, (OWN_SIXTEENTHS >> 32) as u32],
         ],
-        constants![BATCH, CELL_BITS, FAN, FAN_BITS, MARGIN_REACH, PATCH, RANK_BLOCK_FLAGS, SQUARE, SUPPORT, TOP_NODES],
+        constants![BATCH, CELL_BITS, FAN, FAN_BITS, LARGE_SPLAT_GROUPS, MARGIN_REACH, PATCH, RANK_BLOCK_FLAGS],
+        constants![SQUARE, SUPPORT, TOP_NODES],
     ],
 };
 
@@ -70,18 +73,14 @@ passes! {
     "splat", LIBRARY;
     SET_UP = "set_up",
     BOXES = "boxes",
-    CLEAR_DEPTH = "clear_depth",
     DEPTH = "depth",
-    DEPTH_LARGE = "depth_large",
     RECOVER_COUNT = "recover_count",
     RECOVER = "recover",
     pub(super) CLEAR_WORDS = "clear_words",
     REFINE = "refine",
     ERASE = "erase",
-    ERASE_LARGE = "erase_large",
     REDRAW = "redraw",
     ATTRIBUTES = "attributes",
-    ADD_CENTERS = "add_centers",
     SUM_BLOCKS = "sum_blocks",
     TRIM = "trim",
 }
@@ -127,13 +126,9 @@ pub(crate) struct SplatBuffers {
     tree: wgpu::Buffer,
     /// Indices of splats too large for one invocation.
     large: wgpu::Buffer,
-    /// Depth per pixel, pushed back by ε, row by row, as `imports/depth_map.wgsl` has it; infinite where nothing is.
-    pub(crate) depth: wgpu::Buffer,
     /// Change of each splat in the last refinement, and the marks of cells with erased depths (`imports/redraw.wgsl`).
     changes: wgpu::Buffer,
     cells: wgpu::Buffer,
-    /// Centres of splats in each pixel, row by row (`centers.rs`).
-    centers: wgpu::Buffer,
     /// Blocks of pixels, row by row (`imports/blocks.wgsl`).
     blocks: wgpu::Buffer,
     /// Zeros for frames whose noise is not measured.
@@ -146,16 +141,13 @@ impl SplatBuffers {
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
     pub(crate) fn new(gpu: &Gpu, screen_capacity: u32, size: [u32; 2]) -> Result<Self, Error> {
-        let pixels = size[0] as usize * size[1] as usize;
         let nodes = 1 + screen_capacity.div_ceil(TOP_SPLATS) as usize * TOP_NODES as usize;
         Ok(Self {
             splats: gpu.storage::<[u8; SPLAT_BYTES]>("splats", screen_capacity as usize)?,
             large: gpu.storage::<u32>("large splats", screen_capacity as usize)?,
             tree: gpu.storage::<[u32; 2]>("tree of splats", nodes)?,
-            depth: gpu.storage::<u32>("depth map", pixels)?,
             changes: gpu.storage::<u32>("changes of splats", screen_capacity as usize)?,
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
-            centers: gpu.storage::<u32>("centres of splats", pixels)?,
             blocks: gpu.storage::<u32>("blocks of pixels", block_count(size) as usize)?,
             no_noise: gpu.storage::<FrameStatistics>("no noise", 1)?,
         })
@@ -168,22 +160,13 @@ pub(crate) struct SplatPasses {
     /// For each [`Round`].
     set_up: [Pass; 2],
     boxes: Pass,
-    clear_depth: Pass,
     depth: [Pass; 2],
-    /// For each [`Round`].
-    depth_large: [Pass; 2],
-    redraw_large: Pass,
     recover_count: Pass,
-    scan_recovered: Pass,
     recover: Pass,
-    work: WorkPass,
-    clear_words: Pass,
     refine: Pass,
     erase: Pass,
-    erase_large: Pass,
     redraw: Pass,
     attributes: Pass,
-    add_centers: Pass,
     sum_blocks: Pass,
     /// The pass that only counts covered pixels, and the pass that trims too.
     trim: [Pass; 2],
@@ -202,9 +185,6 @@ impl SplatPasses {
         let most_px = ("MAX_INVOCATION_PX", MAX_INVOCATION_PX[usize::from(gpu.is_software())].into());
         let set_up = |recovered: f64| Pass::new(gpu, &SET_UP, &[("RECOVERED_ONLY", recovered), most_px]);
         let depth = |recovered: f64| Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), most_px]);
-        let depth_large = |recovered: f64, redrawn: f64| {
-            Pass::new(gpu, &DEPTH_LARGE, &[("RECOVERED_ONLY", recovered), ("REDRAWN_ONLY", redrawn)])
-        };
         let Channels { color, scalar, measures, backs } = channels;
         let slots = |carried: bool| if carried { f64::from(BATCH) } else { 1.0 };
         let attributes = [
@@ -223,28 +203,20 @@ impl SplatPasses {
         Ok(Self {
             set_up: [set_up(0.0)?, set_up(1.0)?],
             boxes: pass(&BOXES)?,
-            clear_depth: pass(&CLEAR_DEPTH)?,
             depth: [depth(0.0)?, depth(1.0)?],
-            depth_large: [depth_large(0.0, 0.0)?, depth_large(1.0, 0.0)?],
-            redraw_large: depth_large(0.0, 1.0)?,
             recover_count: pass(&RECOVER_COUNT)?,
-            scan_recovered: scan_pass(gpu, Counter::Recovered, Some(Counter::Passive))?,
-            recover: pass(&RECOVER)?,
-            work: WorkPass::new(gpu)?,
-            clear_words: pass(&CLEAR_WORDS)?,
+            recover: Pass::new(gpu, &RECOVER, &[few_constant(gpu)])?,
             refine: pass(&REFINE)?,
             erase: Pass::new(gpu, &ERASE, &[most_px])?,
-            erase_large: pass(&ERASE_LARGE)?,
             redraw: Pass::new(gpu, &REDRAW, &[most_px])?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
-            add_centers: pass(&ADD_CENTERS)?,
             sum_blocks: pass(&SUM_BLOCKS)?,
             trim: [trim(0.0)?, trim(1.0)?],
             linear: steps,
         })
     }
 
-    /// Visibility pass: draws the surfels of a round into the depth map, which the first round clears [Paper, §7].
+    /// Visibility pass: draws the surfels of a round into the depth map [Paper, §7].
     pub(crate) fn steps_visibility(
         &self,
         gpu: &Gpu,
@@ -254,24 +226,14 @@ impl SplatPasses {
         splats: &SplatBuffers,
         round: Round,
     ) -> Vec<Step> {
-        let SplatBuffers { splats: list, tree, large, depth, changes, cells: marks, .. } = splats;
-        let counters = &screen.counters;
-        let set_up = [frame, counters, surfels, list, tree, large];
-        let mut steps = vec![self.set_up[round as usize].step(gpu, &set_up, screen.groups(round.work_256()))];
-        steps.push(self.work.step(gpu, frame, screen));
-        let work = match round {
-            Round::Active => {
-                steps.push(self.clear_depth.step(gpu, &[frame, depth], pixel_groups(screen)));
-                Work::Queries256
-            }
-            Round::Recovered => Work::Recovered256,
-        };
-        let small = [frame, counters, list, tree, depth];
-        steps.push(self.depth[round as usize].step(gpu, &small, screen.groups(work)));
-        let larges = screen.groups(Work::LargeSplats);
-        let large = [frame, counters, list, tree, large, changes, marks, depth];
-        steps.push(self.depth_large[round as usize].step(gpu, &large, larges));
-        steps
+        let SplatBuffers { splats: list, tree, large, .. } = splats;
+        let ScreenBuffers { counters, depth, centers, .. } = screen;
+        let at = round as usize;
+        let set_up = [frame, counters, surfels, list, tree, large, centers];
+        vec![
+            self.set_up[at].step(gpu, &set_up, screen.groups(round.work_256())),
+            self.depth[at].step(gpu, &[frame, counters, list, tree, large, depth], screen.groups(round.work_drawn())),
+        ]
     }
 
     /// Refinement: removes splats from the depth map whose point it hides [Paper, §7, Depth Refinement].
@@ -281,39 +243,25 @@ impl SplatPasses {
         frame: &wgpu::Buffer,
         screen: &ScreenBuffers,
         splats: &SplatBuffers,
-    ) -> [Step; 6] {
-        let SplatBuffers { splats: list, tree, large, depth, changes, cells: marks, .. } = splats;
-        let counters = &screen.counters;
-        let all = || screen.groups(Work::Queries256);
-        let larges = || screen.groups(Work::LargeSplats);
+    ) -> [Step; 3] {
+        let SplatBuffers { splats: list, tree, large, changes, cells: marks, .. } = splats;
+        let ScreenBuffers { counters, depth, .. } = screen;
+        let drawn = || screen.groups(Work::QueriesDrawn);
+        let refine = [frame, counters, list, depth, tree, changes, marks];
         [
-            self.clear_words.step(gpu, &[frame, marks], cells(screen.size).div_ceil(LARGE_GROUP)),
-            self.refine.step(gpu, &[frame, counters, list, depth, tree, changes], all()),
-            self.erase.step(gpu, &[frame, counters, list, tree, changes, depth, marks], all()),
-            self.erase_large.step(gpu, &[frame, counters, list, tree, changes, large, depth, marks], larges()),
-            self.redraw.step(gpu, &[frame, counters, list, tree, changes, marks, depth], all()),
-            self.redraw_large.step(gpu, &[frame, counters, list, tree, large, changes, marks, depth], larges()),
+            self.refine.step(gpu, &refine, screen.groups(Work::Queries256)),
+            self.erase.step(gpu, &[frame, counters, list, tree, changes, large, depth, marks], drawn()),
+            self.redraw.step(gpu, &[frame, counters, list, tree, changes, marks, large, depth], drawn()),
         ]
     }
 
     /// Appends to the queries the passive points that the depth map does not surely hide [Paper, §7, Grid Culling].
-    pub(crate) fn steps_recover(
-        &self,
-        gpu: &Gpu,
-        frame: &wgpu::Buffer,
-        screen: &ScreenBuffers,
-        splats: &SplatBuffers,
-    ) -> Vec<Step> {
-        let ScreenBuffers { counters, density, points, passive, block_sums, queries, .. } = screen;
-        let depth = &splats.depth;
+    pub(crate) fn steps_recover(&self, gpu: &Gpu, frame: &wgpu::Buffer, screen: &ScreenBuffers) -> [Step; 2] {
+        let ScreenBuffers { counters, density, points, passive, block_sums, queries, depth, arguments, .. } = screen;
         let blocks = || screen.groups(Work::PassiveBlocks);
         let count = [frame, points, passive, counters, density, depth, block_sums];
-        vec![
-            self.recover_count.step(gpu, &count, blocks()),
-            self.scan_recovered.step(gpu, &[frame, block_sums, counters], 1),
-            self.recover.step(gpu, &[frame, passive, counters, block_sums, queries], blocks()),
-            self.work.step(gpu, frame, screen),
-        ]
+        let recover = [frame, passive, counters, block_sums, queries, &arguments[2]];
+        [self.recover_count.step(gpu, &count, blocks()), self.recover.step(gpu, &recover, blocks())]
     }
 
     /// Draws the attributes of all rounds' surfels and trims them, by `rules`.
@@ -328,8 +276,8 @@ impl SplatPasses {
         layers: &LayerBuffers,
         rules: LayerRules<'_>,
     ) -> Vec<Step> {
-        let SplatBuffers { splats: list, tree, depth, centers, blocks: summed, no_noise, .. } = splats;
-        let ScreenBuffers { counters, values, sixteenths, .. } = screen;
+        let SplatBuffers { splats: list, tree, blocks: summed, no_noise, .. } = splats;
+        let ScreenBuffers { counters, values, sixteenths, depth, centers, .. } = screen;
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let mut steps = Vec::new();
         for _ in 0..if rules.depth_refinement { 2 } else { 0 } {
@@ -340,9 +288,6 @@ impl SplatPasses {
         steps.push(self.attributes.step(gpu, &attributes, patches(screen, PATCH)));
         let noise = rules.noise.unwrap_or(no_noise);
         if rules.trim {
-            steps.push(self.clear_words.step(gpu, &[frame, centers], pixel_groups(screen)));
-            let all = screen.groups(Work::Queries256);
-            steps.push(self.add_centers.step(gpu, &[frame, counters, list, tree, centers], all));
             let blocks = [frame, cover, sixteenths, noise, summed];
             steps.push(self.sum_blocks.step(gpu, &blocks, block_count(screen.size).div_ceil(SMALL_GROUP)));
         }
@@ -366,11 +311,6 @@ fn cells([columns, rows]: [u32; 2]) -> u32 {
 /// Blocks of pixels in a picture of this size.
 fn block_count(size: [u32; 2]) -> u32 {
     size.map(|side| side.div_ceil(BLOCK_PX as u32)).iter().product()
-}
-
-/// Workgroups with an invocation per pixel.
-fn pixel_groups(screen: &ScreenBuffers) -> u32 {
-    (screen.size[0] * screen.size[1]).div_ceil(LARGE_GROUP)
 }
 
 /// Workgroups for rectangles of this many columns and rows.

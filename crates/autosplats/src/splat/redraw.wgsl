@@ -1,11 +1,12 @@
 // Depth refinement: redraws the living splats that meet cells with erased depths, and splats that just revived. Taking
-// a minimum twice changes nothing [Paper, §7, Depth Refinement].
+// a minimum twice changes nothing [Paper, §7, Depth Refinement]. Splats are drawn as in `depth`.
 //
-// Reads: counters, splats, tree, changes, cells. Reads and writes: depth_map.
+// Reads: counters, splats, tree, changes, cells, large. Reads and writes: depth_map.
 
 #import frame
-#import fragment
+#import draw_depth
 #import groups
+#import large
 #import marked
 #import splat
 
@@ -14,30 +15,31 @@
 @group(0) @binding(3) var<storage, read> tree: array<vec2u>;
 @group(0) @binding(4) var<storage, read> changes: array<u32>;
 @group(0) @binding(5) var<storage, read> cells: array<u32>;
-@group(0) @binding(6) var<storage, read_write> depth_map: array<atomic<u32>>;
+@group(0) @binding(6) var<storage, read> large: array<u32>;
+@group(0) @binding(7) var<storage, read_write> depth_map: array<atomic<u32>>;
 
 override MAX_INVOCATION_PX: u32;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn redraw(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = group_index(workgroup) * LARGE_GROUP + local;
+    let group = group_index(workgroup);
+    if group < LARGE_SPLAT_GROUPS {
+        for (var place = first_large(group, local); place < counters[LARGE]; place += NEXT_LARGE) {
+            let index = large[place];
+            let bounds = tree[level_start(SPLATS) + index];
+            // Dead splats count as empty.
+            if !is_empty(bounds) && is_redrawn(index, bounds) {
+                draw_together(splats[index], bounds, local);
+            }
+        }
+        return;
+    }
+    let index = (group - LARGE_SPLAT_GROUPS) * LARGE_GROUP + local;
     if index >= counters[ACTIVE] + counters[RECOVERED] {
         return;
     }
     let bounds = tree[level_start(SPLATS) + index];
-    if is_empty(bounds) {
-        return;
-    }
-    let area = bounds_area(bounds);
-    if area > MAX_INVOCATION_PX || !is_redrawn(index, bounds) {
-        return;
-    }
-    let splat = splats[index];
-    for (var row = firsts(bounds).y; row <= lasts(bounds).y; row++) {
-        let line = line_of(splat, row);
-        let span = span_of(splat, line, bounds);
-        for (var column = span.x; column <= span.y; column++) {
-            draw_depth(splat, line, u32(column));
-        }
+    if !is_empty(bounds) && bounds_area(bounds) <= MAX_INVOCATION_PX && is_redrawn(index, bounds) {
+        draw_alone(splats[index], bounds);
     }
 }

@@ -1,6 +1,7 @@
-// Depth refinement: a splat is dead if the depth map hides its own point, else alive [Paper, §7, Depth Refinement].
+// Depth refinement: a splat is dead if the depth map hides its own point, else alive [Paper, §7, Depth Refinement]. The
+// pass also clears the marks of the cells, which the next one sets.
 //
-// Reads: counters, splats, depth_map. Reads and writes: tree. Writes: changes.
+// Reads: counters, splats, depth_map. Reads and writes: tree. Writes: changes, cells.
 
 #import frame
 #import groups
@@ -13,11 +14,17 @@
 @group(0) @binding(3) var<storage, read> depth_map: array<u32>;
 @group(0) @binding(4) var<storage, read_write> tree: array<vec2u>;
 @group(0) @binding(5) var<storage, read_write> changes: array<u32>;
+@group(0) @binding(6) var<storage, read_write> cells: array<u32>;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn refine(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let index = group_index(workgroup) * LARGE_GROUP + local;
-    if index >= counters[ACTIVE] + counters[RECOVERED] {
+    let len = counters[ACTIVE] + counters[RECOVERED];
+    let invocations = (len + LARGE_GROUP - 1u) / LARGE_GROUP * LARGE_GROUP;
+    for (var cell = index; cell < arrayLength(&cells) && index < invocations; cell += invocations) {
+        cells[cell] = 0u;
+    }
+    if index >= len {
         return;
     }
     let place = level_start(SPLATS) + index;

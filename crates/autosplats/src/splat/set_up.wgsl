@@ -1,9 +1,11 @@
-// Splat set-up: makes surfels ready to be drawn over their pixels. The CPU form is `setup.rs`.
+// Splat set-up: makes surfels ready to be drawn over their pixels. The CPU form is `setup.rs`. Adds the centre of each
+// splat to its pixel, for the trim: `centers.rs`.
 //
-// Reads: surfels. Reads and writes: counters. Writes: splats, tree, large.
+// Reads: surfels. Reads and writes: counters, centers. Writes: splats, tree, large.
 
 #import frame
 #import groups
+#import screen
 #import splat
 #import surfel
 
@@ -13,6 +15,7 @@
 @group(0) @binding(4) var<storage, read_write> tree: array<vec2u>;
 // Splats too large for one invocation, in any order.
 @group(0) @binding(5) var<storage, read_write> large: array<u32>;
+@group(0) @binding(6) var<storage, read_write> centers: array<atomic<u32>>;
 
 // Whether only the recovered surfels are new.
 override RECOVERED_ONLY: bool;
@@ -87,11 +90,24 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let y = extent(c.y, c.z, vec2f(axis_a.y, axis_b.y), across, center_px.y, frame.size.y, frame.middle.y);
     let bounds = vec2u(x, y);
     tree[place] = bounds;
-    if !is_empty(bounds) && bounds_area(bounds) > MAX_INVOCATION_PX {
-        large[atomicAdd(&counters[LARGE], 1u)] = index;
+    if !is_empty(bounds) {
+        if bounds_area(bounds) > MAX_INVOCATION_PX {
+            large[atomicAdd(&counters[LARGE], 1u)] = index;
+        }
+        add_center(center_px, surfel.pixel);
     }
     let epsilon = EPSILON_RADII * surfel.radius;
     splats[index] = Splat(center_px, plane, u, v, c.z, epsilon, depth_reach, surfel.pixel);
+}
+
+fn add_center(center_px: vec2f, of_pixel: u32) {
+    if has_near_flag(of_pixel) {
+        // The pixel need not be that of the centre.
+        return;
+    }
+    let pixel = pixel_xy(of_pixel);
+    let place = vec2u(clamp(CENTER_STEPS * (center_px - vec2f(pixel)), vec2f(0.0), vec2f(CENTER_STEPS - 1.0)));
+    atomicAdd(&centers[pixel.y * frame.size.x + pixel.x], (1u << 24u) | (place.y << 12u) | place.x);
 }
 
 // Depth of a disc's centre, moved off the plane of the eye.

@@ -195,6 +195,8 @@ pub(super) fn time(
         Ok(renderer) => renderer,
         Err(why) => return Ok(Err(why)),
     };
+    // Of the tree's passes, those that build it are told apart.
+    renderer.time_passes(matches!(method, Method::KdTree));
     let mut samples: Vec<(Timings, f64)> = Vec::new();
     let mut counts = Counts::default();
     // The first frame creates the buffers and is not counted, unless it is slow.

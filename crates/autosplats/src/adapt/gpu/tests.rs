@@ -142,17 +142,20 @@ fn compare_surfels(device: &[Surfel], host: &[Surfel]) -> Result<usize, String> 
 #[test]
 fn the_device_fills_the_cells_that_the_host_fills() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = AdaptPasses::new(&gpu).expect("passes");
+    let kinds = [false, true].map(|software| AdaptPasses::for_kind(&gpu, software).expect("passes"));
     let mut all = [0, 0];
     for count in [300, 4000, 60_000] {
         for (name, positions) in test_clouds::all(count) {
             for projection in PROJECTIONS {
                 for size in [[1, 1], [300, 2], [121, 90], [330, 250]] {
                     let case = Case::new(&positions, projection, size);
-                    let made = on_device(&gpu, &passes, &case);
-                    let found = compare_cells(&made.cells, &case.cells());
-                    let found = found.unwrap_or_else(|error| panic!("{name} {count} {projection:?} {size:?}: {error}"));
-                    all = [all[0] + found[0], all[1] + found[1]];
+                    let host = case.cells();
+                    for passes in &kinds {
+                        let found = compare_cells(&on_device(&gpu, passes, &case).cells, &host);
+                        let found =
+                            found.unwrap_or_else(|error| panic!("{name} {count} {projection:?} {size:?}: {error}"));
+                        all = [all[0] + found[0], all[1] + found[1]];
+                    }
                 }
             }
         }
@@ -211,19 +214,19 @@ fn the_device_shrinks_what_the_host_does() {
     compare("in a room", &room, &is_stray, 0.2);
 }
 
-/// Only one kind of device is available for tests, so the workgroup size of the other kind is tested on it too.
+/// Only one kind of device is available for tests, so the passes of the other kind are tested on it too.
 #[test]
 fn however_many_sum_up_a_ball_the_device_adapts_as_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
     let noisy = noisy(test_clouds::bumpy(20_000), 0.015);
     let cases = [("noisy bumps", Case::new(&noisy, PROJECTIONS[0], [320, 240])), ("rows", Case::swept())];
-    for together in TOGETHER {
-        let passes = AdaptPasses::with_form(&gpu, together).expect("passes");
+    for software in [false, true] {
+        let passes = AdaptPasses::for_kind(&gpu, software).expect("passes");
         for (name, case) in &cases {
             let made = on_device(&gpu, &passes, case);
-            compare_usual(made.usual, case.usual()).unwrap_or_else(|error| panic!("{name}, {together}: {error}"));
+            compare_usual(made.usual, case.usual()).unwrap_or_else(|error| panic!("{name}, {software}: {error}"));
             compare_surfels(&made.surfels, &case.adapted())
-                .unwrap_or_else(|error| panic!("{name}, {together}: {error}"));
+                .unwrap_or_else(|error| panic!("{name}, {software}: {error}"));
         }
     }
 }

@@ -66,6 +66,13 @@ fn double_thickness() {
     }
 }
 
+// Begins another cell.
+fn begin() {
+    sums = array<vec4f, SLABS>();
+    used = 0u;
+    doubled = 0u;
+}
+
 // Adds `count` points with this mean.
 fn add(mean: vec3f, count: f32, slab: u32) {
     let sum = vec4f(mean * count, count);
@@ -81,9 +88,4 @@ fn finish(cell: u32) {
     for (var index = used; index < SLABS; index++) {
         clusters[cluster_at(cell, index)] = vec4f(0.0);
     }
-}
-
-// Column and row of the cell of a level that an invocation fills.
-fn place_in(level: Level, index: u32) -> vec2u {
-    return divide(index, level.columns).yx;
 }

@@ -78,7 +78,7 @@ pub(crate) fn upload_screen(gpu: &Gpu, screen: &ScreenPoints, view: &View) -> Sc
 pub(crate) fn find_work(gpu: &Gpu, screen: &ScreenBuffers) {
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     let mut recorder = Recorder::new(gpu, &Clock::Off);
-    recorder.run(&WorkPass::new(gpu).expect("a pass").step(gpu, &frame, screen));
+    WorkPass::new(gpu).expect("a pass").steps_all(gpu, &frame, screen).iter().for_each(|step| recorder.run(step));
     recorder.finish();
 }
 
@@ -92,7 +92,7 @@ fn project<'a>(
 ) -> (ScreenPoints, Vec<u32>) {
     let points = points.into();
     let written = points.written_since(None);
-    let mut uploader = Uploader::new();
+    let mut uploader = Uploader::default();
     let mut device_cloud = DeviceCloud::default();
     device_cloud.resize(gpu, points).expect("room");
     uploader.positions(gpu, points.positions(), &written, &device_cloud, &|_| true).expect("an upload");

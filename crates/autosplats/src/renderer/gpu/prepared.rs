@@ -2,6 +2,8 @@
 
 use std::mem::{Discriminant, discriminant};
 
+use rayon::join;
+
 use crate::Error;
 use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
 use crate::camera::{PlacedView, Reprojection, View};
@@ -49,39 +51,61 @@ pub(super) struct Passes {
 
 impl Passes {
     pub(super) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Ok(Self {
-            project: ProjectPasses::new(gpu, gpu.int64_atomics())?,
+        let (project, others) = join(
+            || ProjectPasses::new(gpu, gpu.int64_atomics()),
+            || join(|| Ok::<_, Error>((PastPasses::new(gpu)?, FitPasses::new(gpu)?)), || ShadePasses::new(gpu)),
+        );
+        let (past_and_fit, shade) = others;
+        let (past, fit) = past_and_fit?;
+        let passes = Self {
+            project: project?,
             search: None,
-            past: PastPasses::new(gpu)?,
-            fit: FitPasses::new(gpu)?,
+            past,
+            fit,
             orient: None,
             adapt: None,
             over_time: None,
             splat: None,
-            shade: ShadePasses::new(gpu)?,
-        })
+            shade: shade?,
+        };
+        gpu.store_pipelines();
+        Ok(passes)
     }
 
     /// Compiles the missing passes for frames of a shape.
     fn compile(&mut self, gpu: &Gpu, shape: &Shape, settings: &Settings) -> Result<(), Error> {
-        if shape.sensors.is_some() && self.orient.is_none() {
-            self.orient = Some(OrientPasses::new(gpu)?);
+        let Reconstruction { engine, k, .. } = settings.reconstruction;
+        let searches = self.search.as_ref().is_some_and(|(of, _)| *of == shape.search);
+        let splats = self.splat.as_ref().is_some_and(|(channels, _)| *channels == shape.channels);
+        let adapts = self.adapt.is_some() || !shape.adapt;
+        let orients = self.orient.is_some() || shape.sensors.is_none();
+        let averages = self.over_time.is_some() || !shape.average;
+        if searches && splats && adapts && orients && averages {
+            return Ok(());
         }
-        if self.search.as_ref().is_none_or(|(of, _)| *of != shape.search) {
-            let Reconstruction { engine, k, .. } = settings.reconstruction;
-            self.search = Some((shape.search, compile(gpu, engine, k)?));
-        }
-        if shape.adapt && self.adapt.is_none() {
-            self.adapt = Some(AdaptPasses::new(gpu)?);
-        }
-        if shape.average && self.over_time.is_none() {
-            self.over_time = Some((OverTimePasses::new(gpu)?, PictureOverTimePasses::new(gpu)?));
-        }
-        if self.splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
-            self.splat = Some((shape.channels, SplatPasses::new(gpu, shape.channels, &linear_steps())?));
-        }
+        let over_time = || Ok((OverTimePasses::new(gpu)?, PictureOverTimePasses::new(gpu)?));
+        let ((search, adapt), (splat, (orient, over_time))) = join(
+            || join(|| unless(searches, || compile(gpu, engine, k)), || unless(adapts, || AdaptPasses::new(gpu))),
+            || {
+                join(
+                    || unless(splats, || SplatPasses::new(gpu, shape.channels, &linear_steps())),
+                    || join(|| unless(orients, || OrientPasses::new(gpu)), || unless(averages, over_time)),
+                )
+            },
+        );
+        self.search = search?.map(|passes| (shape.search, passes)).or(self.search.take());
+        self.adapt = adapt?.or(self.adapt.take());
+        self.splat = splat?.map(|passes| (shape.channels, passes)).or(self.splat.take());
+        self.orient = orient?.or(self.orient.take());
+        self.over_time = over_time?.or(self.over_time.take());
+        gpu.store_pipelines();
         Ok(())
     }
+}
+
+/// What `make` returns, unless it is there already.
+fn unless<T>(is_there: bool, make: impl FnOnce() -> Result<T, Error>) -> Result<Option<T>, Error> {
+    if is_there { Ok(None) } else { make().map(Some) }
 }
 
 /// The properties of a frame that its buffers and steps depend on.
@@ -238,7 +262,7 @@ impl Prepared {
                     Stage::Draw(round) => {
                         steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
                     }
-                    Stage::Recover => steps.extend(splat.steps_recover(gpu, frame, &screen, &splats)),
+                    Stage::Recover => steps.extend(splat.steps_recover(gpu, frame, &screen)),
                     Stage::Keep => {
                         if shape.coherent {
                             steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));

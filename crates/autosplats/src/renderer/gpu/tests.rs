@@ -4,6 +4,7 @@ use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use crate::gpu::{INT64_ATOMICS, PassSource, link};
 
+mod dispatches;
 mod layouts;
 
 /// Whether a pass is a render pass: all of them blend.

@@ -78,7 +78,8 @@ impl SearchPasses {
 
     fn with_form(gpu: &Gpu, k: u32, four: bool) -> Result<Self, Error> {
         let round = |round: Round| RoundPasses::new(gpu, k, four, round);
-        Ok(Self { rounds: [round(Round::Active)?, round(Round::Recovered)?], work: WorkPass::new(gpu)? })
+        let (active, recovered) = rayon::join(|| round(Round::Active), || round(Round::Recovered));
+        Ok(Self { rounds: [active?, recovered?], work: WorkPass::new(gpu)? })
     }
 
     /// Finds the neighbourhoods of the queries of `round`.

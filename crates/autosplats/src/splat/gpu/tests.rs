@@ -64,6 +64,8 @@ impl Scene<'_> {
             [color, scalar].into_iter().flatten()
         });
         screen.values = gpu.storage_with("values", &values.collect::<Vec<u32>>()).expect("room");
+        let none = vec![no_depth(); (size[0] * size[1]) as usize];
+        gpu.queue.write_buffer(&screen.depth, 0, bytemuck::cast_slice(&none));
         let words = sixteenths(self.surfels, self.view).words();
         gpu.queue.write_buffer(&screen.sixteenths, 0, bytemuck::cast_slice(&words));
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
@@ -87,7 +89,7 @@ impl Scene<'_> {
             recorder.finish();
         };
         let pixels = (screen.size[0] * screen.size[1]) as usize;
-        let depth = || read_depth(gpu, splats, pixels);
+        let depth = || read_depth(gpu, screen, pixels);
         let visibility = |round| run(passes.steps_visibility(gpu, frame, screen, surfels, splats, round));
         set_counter(gpu, screen, Counter::Active, self.active);
         visibility(Round::Active);
@@ -127,8 +129,13 @@ impl Scene<'_> {
 }
 
 /// The depth map as depths.
-fn read_depth(gpu: &Gpu, splats: &SplatBuffers, pixels: usize) -> Vec<f32> {
-    let keys: Vec<u32> = read_back(gpu, &splats.depth, pixels).expect("a depth map");
+/// The key of no depth in `shared/depth_map.wgsl`.
+fn no_depth() -> u32 {
+    f32::INFINITY.to_bits() ^ 0x8000_0000
+}
+
+fn read_depth(gpu: &Gpu, screen: &ScreenBuffers, pixels: usize) -> Vec<f32> {
+    let keys: Vec<u32> = read_back(gpu, &screen.depth, pixels).expect("a depth map");
     let mask = |key: u32| if key >= 0x8000_0000 { 0x8000_0000 } else { u32::MAX };
     keys.into_iter().map(|key| f32::from_bits(key ^ mask(key))).collect()
 }
@@ -386,7 +393,7 @@ fn hidden_points_are_not_recovered() {
     let Buffers { frame, screen, surfels: on_device, splats, .. } = &buffers;
     let mut recorder = Recorder::new(&gpu, &Clock::Off);
     let visibility = passes.steps_visibility(&gpu, frame, screen, on_device, splats, Round::Active);
-    let recover = passes.steps_recover(&gpu, frame, screen, splats);
+    let recover = passes.steps_recover(&gpu, frame, screen);
     visibility.iter().chain(&recover).for_each(|step| recorder.run(step));
     recorder.finish();
 

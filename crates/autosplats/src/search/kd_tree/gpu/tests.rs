@@ -51,7 +51,7 @@ fn find(gpu: &Gpu, passes: &KdTreePasses, positions: &[[f32; 3]], view: &View, k
     let mut device_cloud = DeviceCloud::default();
     device_cloud.resize(gpu, Points::Cloud(&cloud)).expect("room");
     let all = Points::Cloud(&cloud).written_since(None);
-    Uploader::new().positions(gpu, cloud.positions(), &all, &device_cloud, &|_| true).expect("an upload");
+    Uploader::default().positions(gpu, cloud.positions(), &all, &device_cloud, &|_| true).expect("an upload");
     let uploaded = upload_screen(gpu, &screen, view);
     let neighborhoods = gpu.storage::<[f32; 12]>("neighbourhoods", uploaded.capacity as usize).expect("room");
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");

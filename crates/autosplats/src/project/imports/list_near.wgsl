@@ -1,16 +1,12 @@
-// Lists the points of the sparse cells around the eye after the screen points, if any is near: see `near.rs`.
-//
-// Reads: near, names. Reads and writes: counters. Writes: source. One workgroup; each invocation takes a run of cells.
+// Lists the points of the sparse cells around the eye after the screen points, if any is near: see `near.rs`. Each
+// invocation takes a run of cells. The including pass binds `near` and `names` for reading, and `counters`, `source`
+// and `arguments`.
 
 #import frame
 #import names
 #import near_cells
 #import near_points
-
-@group(0) @binding(1) var<storage, read> near: array<u32>;
-@group(0) @binding(2) var<storage, read_write> counters: array<u32>;
-@group(0) @binding(3) var<storage, read_write> source: array<u32>;
-@group(0) @binding(4) var<storage, read> names: array<u32>;
+#import put_work
 
 const CELLS_EACH = NEAR_CELLS / LARGE_GROUP;
 
@@ -36,8 +32,8 @@ fn is_before(a: u32, b: u32) -> bool {
     return near[a] < near[b];
 }
 
-@compute @workgroup_size(LARGE_GROUP)
-fn list_near(@builtin(local_invocation_index) local: u32) {
+// To be called by all invocations of one workgroup of LARGE_GROUP.
+fn list_near(local: u32) {
     let first = local * CELLS_EACH;
     if local == 0u {
         atomicStore(&crowded, OCTAVES);
@@ -73,18 +69,19 @@ fn list_near(@builtin(local_invocation_index) local: u32) {
     workgroupBarrier();
     let total = before[LARGE_GROUP];
     let is_listed = frame.near_cells == 1u && atomicLoad(&any_near) == 1u && total > frame.k && total <= MOST_NEAR;
-    let visible = counters[VISIBLE];
-    // All have read the counter before one changes it.
-    workgroupBarrier();
+    let near_first = counters[NEAR_FIRST];
     if local == 0u {
-        counters[NEAR_FIRST] = visible;
+        let visible = near_first + select(0u, total, is_listed);
         counters[CROWDED_OCTAVE] = atomicLoad(&crowded);
-        counters[VISIBLE] = visible + select(0u, total, is_listed);
+        counters[VISIBLE] = visible;
+        put_work(VISIBLE256, visible, LARGE_GROUP);
+        // One block at least: the last tells how many points are active.
+        put_work(VISIBLE_BLOCKS, max(visible, 1u), RANK_BLOCK_FLAGS);
     }
     if !is_listed {
         return;
     }
-    var place = visible + before[local];
+    var place = near_first + before[local];
     for (var cell = first; cell < first + CELLS_EACH; cell++) {
         let len = listed_len(cell);
         let first_entry = near_entries(cell);
