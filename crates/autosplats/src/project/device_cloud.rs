@@ -234,6 +234,9 @@ pub(crate) struct Uploader {
     next: usize,
 }
 
+/// Writes the points of an index range into a buffer.
+type Write<'a> = dyn Fn(Range<usize>, wgpu::WriteOnly<'_, [u8]>) + Sync + 'a;
+
 /// The staging buffers of a load, each of one piece of positions.
 #[derive(Debug, Default)]
 struct Load {
@@ -296,7 +299,7 @@ impl Uploader {
         gpu: &Gpu,
         pieces: Vec<Piece<'_>>,
         point_bytes: usize,
-        write: &(dyn Fn(Range<usize>, wgpu::WriteOnly<'_, [u8]>) + Sync),
+        write: &Write<'_>,
         done: &mut Done<'_>,
     ) -> Result<(), Error> {
         for pieces in pieces.chunks(PIECES_PER_LOAD) {
@@ -311,13 +314,7 @@ impl Uploader {
 
 impl Load {
     /// Writes pieces side by side, and submits their copies.
-    fn copy(
-        &mut self,
-        gpu: &Gpu,
-        pieces: &[Piece<'_>],
-        point_bytes: usize,
-        write: &(dyn Fn(Range<usize>, wgpu::WriteOnly<'_, [u8]>) + Sync),
-    ) -> Result<(), Error> {
+    fn copy(&mut self, gpu: &Gpu, pieces: &[Piece<'_>], point_bytes: usize, write: &Write<'_>) -> Result<(), Error> {
         let lost = || gpu.check_lost().err().unwrap_or_else(|| Error::DeviceLost("it takes no points".into()));
         while self.buffers.len() < pieces.len() {
             let usage = wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC;

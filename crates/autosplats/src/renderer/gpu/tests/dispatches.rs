@@ -45,6 +45,7 @@ impl Commands {
 }
 
 /// Two dispatches depend on each other if they share a buffer that one of them writes.
+#[allow(clippy::mutable_key_type, reason = "buffers are compared by what they are, not by what they hold")]
 fn longest_chain(steps: &[Step]) -> usize {
     // For each buffer, the lengths of the chains that end with its last write, and with the longest read since.
     let mut ends: HashMap<wgpu::Buffer, [usize; 2]> = HashMap::new();
