@@ -47,9 +47,9 @@ pub(crate) const TILE_AREA: usize = TILE * TILE;
 /// The visible surface, a value per pixel and layer.
 ///
 /// Layers are stored tile by tile, [`TILE`]×[`TILE`] pixels each, so that a tile is one piece of cache and of work.
-/// [`index`](Self::index) finds a pixel of the picture. A frame's tiles without any splat share one piece, so change only
-/// layers from [`new`](Self::new). Layers may have a margin around the picture, whose pixels may be covered too. A layer
-/// that was not requested is empty.
+/// [`index`](Self::index) finds a pixel of the picture. A frame's tiles without any splat share one piece, so change
+/// only layers from [`new`](Self::new). Layers may have a margin around the picture, whose pixels may be covered too. A
+/// layer that was not requested is empty.
 ///
 /// # Examples
 ///

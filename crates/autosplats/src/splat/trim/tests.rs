@@ -1,6 +1,7 @@
 //! Tests of trimming on drawings, and on borders of points scattered below lines.
 
 use std::collections::BTreeSet;
+use std::sync::LazyLock;
 
 use super::super::centers::one;
 use super::blurred::{BLOCK_PX, FRINGE_BLOCKS};
@@ -12,6 +13,14 @@ use autosplats_cloud::glam::DVec3;
 
 /// The very edge of a surface that curves away.
 const SHOWN: PixelSurface = PixelSurface { depth: 1.0, normal: [1.0, 0.0, 0.0] };
+
+/// A picture of one tile.
+static ONE_TILE: LazyLock<Tiles> = LazyLock::new(|| Tiles::all([TILE; 2]));
+
+/// The outline of a picture of one tile, without noise.
+fn of_a_tile<'a>(rims: &'a [Rim], centers: &'a [u32], sixteenths: &'a Sixteenths, view: &'a View) -> Outline<'a> {
+    Outline { rims, centers, sixteenths, tiles: &ONE_TILE, view, blurred: None }
+}
 
 fn view(size: [u32; 2]) -> View {
     let camera =
@@ -36,14 +45,7 @@ fn trimmed(drawing: &[&str]) -> Vec<String> {
         }
     }
     let sixteenths = Sixteenths::with(size.map(|side| side as usize), []);
-    let outline = Outline {
-        rims: &rims,
-        centers: &[0; TILE_AREA],
-        sixteenths: &sixteenths,
-        tiles: &Tiles::all([TILE; 2]),
-        view: &view,
-        blurred: None,
-    };
+    let outline = of_a_tile(&rims, &[0; TILE_AREA], &sixteenths, &view);
     let edges = outline.edges([0, 0]);
     let row = |(y, row): (usize, &&str)| {
         let goes = |x: usize| outline.sticks_out(x, y, SHOWN, edges.near([x, y]));
@@ -115,14 +117,7 @@ fn stays(size: [usize; 2], points: &[[f32; 2]], drawn: &[[f32; 2]]) -> impl Fn(u
     let view = view(size.map(|side| side as u32));
     let sixteenths = Sixteenths::with(size, points.iter().copied());
     move |x, y| {
-        let outline = Outline {
-            rims: &rims,
-            centers: &centers,
-            sixteenths: &sixteenths,
-            tiles: &Tiles::all([TILE; 2]),
-            view: &view,
-            blurred: None,
-        };
+        let outline = of_a_tile(&rims, &centers, &sixteenths, &view);
         let edges = outline.edges([0, 0]);
         rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, SHOWN, edges.near([x, y]))
     }
@@ -182,14 +177,7 @@ fn told(wide: bool, per_column: usize, depth: impl Fn(f32) -> f32) -> [f64; 2] {
         centers[y as usize * TILE + x as usize] += one([x as usize, y as usize], [x, y]);
     }
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
-    let outline = Outline {
-        rims: &[4.0; TILE_AREA],
-        centers: &centers,
-        sixteenths: &sixteenths,
-        tiles: &Tiles::all([TILE; 2]),
-        view: &view,
-        blurred: None,
-    };
+    let outline = of_a_tile(&[4.0; TILE_AREA], &centers, &sixteenths, &view);
     let mut counts = [0, 0, 0];
     for (x, y) in (3..TILE - 3).flat_map(|x| (3..TILE - 3).map(move |y| (x, y))) {
         let below = y as f32 + 0.5 - line(x as f32 + 0.5);
@@ -233,14 +221,13 @@ fn above_the_line(per_pixel: usize, noise_px: f32, sure: Option<f32>) -> Vec<f32
     let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
     let known = |sure: f32| Noise { level: noise_px * view.pixel_size(1.0), sure, ..Noise::NONE };
-    let blurred =
-        BlurredBorders::new(sure.map_or(Noise::NONE, known), 1.6, (&rims, &Tiles::all([TILE; 2])), &sixteenths, &view);
+    let blurred = BlurredBorders::new(sure.map_or(Noise::NONE, known), 1.6, (&rims, &ONE_TILE), &sixteenths, &view);
     assert_eq!(blurred.is_some(), sure.is_some(), "nothing is blurred without noise");
     let outline = Outline {
         rims: &rims,
         centers: &[0; TILE_AREA],
         sixteenths: &sixteenths,
-        tiles: &Tiles::all([TILE; 2]),
+        tiles: &ONE_TILE,
         view: &view,
         blurred: blurred.as_ref(),
     };
@@ -301,14 +288,14 @@ fn a_surface_before_a_denser_one_is_no_fringe() {
     let rims: Vec<_> = (0..TILE_AREA).map(|pixel| if pixel % TILE < 44 { -7.0 } else { EMPTY }).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
     let noise = Noise { level: 2.0 * view.pixel_size(1.0), ..Noise::NONE };
-    let blurred = BlurredBorders::new(noise, 1.6, (&rims, &Tiles::all([TILE; 2])), &sixteenths, &view);
+    let blurred = BlurredBorders::new(noise, 1.6, (&rims, &ONE_TILE), &sixteenths, &view);
     assert!(blurred.is_some(), "there is noise");
     let blurred = blurred.as_ref();
     let outline = Outline {
         rims: &rims,
         centers: &[0; TILE_AREA],
         sixteenths: &sixteenths,
-        tiles: &Tiles::all([TILE; 2]),
+        tiles: &ONE_TILE,
         view: &view,
         blurred,
     };
@@ -360,9 +347,8 @@ fn what_is_empty_lies_where_it_does() {
         let rim = |pixel: usize| if is_empty(pixel % TILE, pixel / TILE) { EMPTY } else { 2.0 };
         let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
         let noise = Noise { level: 1.0, ..Noise::NONE };
-        let blurred =
-            BlurredBorders::new(noise, 1.6, (&rims, &Tiles::all([TILE; 2])), &Sixteenths::with([TILE; 2], []), &view)
-                .expect("noise");
+        let blurred = BlurredBorders::new(noise, 1.6, (&rims, &ONE_TILE), &Sixteenths::with([TILE; 2], []), &view)
+            .expect("noise");
         blurred.towards_empty(at, 16.0)
     };
     let is_near = |found: Option<[f32; 2]>, [x, y]: [f32; 2]| {
@@ -460,14 +446,7 @@ fn slits_between_dense_points_open_beside_single_empty_pixels() {
     };
     let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
-    let outline = Outline {
-        rims: &rims,
-        centers: &[0; TILE_AREA],
-        sixteenths: &sixteenths,
-        tiles: &Tiles::all([TILE; 2]),
-        view: &view,
-        blurred: None,
-    };
+    let outline = of_a_tile(&rims, &[0; TILE_AREA], &sixteenths, &view);
     let edges = outline.edges([0, 0]);
     let pixels = (3..size[0] - 3).flat_map(|x| (3..size[1] - 3).map(move |y| [x, y]));
     // Right pixels and all pixels, inside the surfaces and inside the slit.
