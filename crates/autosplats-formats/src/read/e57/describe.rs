@@ -38,7 +38,7 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let poses = root.scans.iter().filter_map(|scan| Some(format!("{}: {}", scan.shown(), scan.pose_note.as_ref()?)));
     notes.extend(poses);
     if pages.cut_off() {
-        notes.push(format!("the file is cut off at byte {}; what is left is read", job.bytes.len()));
+        notes.push(format!("the file is cut off at byte {}", job.bytes.len()));
     }
     // A point takes a byte at least, so a file holds no more points than bytes.
     let stated = root.scans.iter().try_fold(0_u64, |sum, scan| sum.checked_add(scan.points));
