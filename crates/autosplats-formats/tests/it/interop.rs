@@ -16,7 +16,7 @@ fn other_programs_read_the_points_of_octrees() {
     let Some(data) = shared_data() else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut pairs = Vec::new();
-    // Point formats 0 to 8, GeoTIFF keys and text, extra bytes, degrees; more than one page of nodes in none.
+    // With GeoTIFF keys and text, extra bytes and degrees among them.
     for entry in std::fs::read_dir(data.join("scans")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|extension| extension == "las" || extension == "laz") {

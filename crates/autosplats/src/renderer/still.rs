@@ -4,8 +4,8 @@ use autosplats_cloud::check_memory;
 
 use crate::MAX_SIDE;
 
-/// Most memory in bytes that stages and layers take per pixel of a picture: 100, and 170 for each visible point, of
-/// which a dense scan has up to 0.7 a pixel (measured on the CPU, docs/decisions/0053-stills.md). Where a picture is
+/// Most memory in bytes that stages and layers take per pixel of a picture: 100, and 170 for each visible point. A
+/// dense scan has up to 0.7 of these a pixel (measured on the CPU, docs/decisions/0053-stills.md). Where a picture is
 /// empty, next to none of it is taken.
 pub const BYTES_PER_PIXEL: u64 = 220;
 /// Most pixels of a still that is supersampled. In larger pictures details are larger too, and the rendered pictures
