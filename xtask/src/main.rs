@@ -106,9 +106,10 @@ fn root() -> Result<&'static Path> {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask has a workspace around it")
 }
 
-/// Broken files for every reader. Built like the tests, so that overflows are found too.
+/// Broken files for every reader. Built for speed, as inputs count in millions; overflows are found as in the tests.
 fn fuzz(root: &Path, options: &[&str]) -> Result<()> {
-    cargo(root, &[&["run", "--locked", "--quiet", "-p", "autosplats-fuzz", "--"], options].concat())
+    let program = ["run", "--locked", "--quiet", "--profile", "fuzz", "-p", "autosplats-fuzz", "--"];
+    cargo(root, &[&program, options].concat())
 }
 
 /// The tests of faults at random moments, again and again. Built like the tests, which are there already.
