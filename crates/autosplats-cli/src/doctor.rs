@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use autosplats::{AdapterSummary, Backend as BackendChoice, Frame, Renderer, Settings, adapters};
+use autosplats::{
+    AdapterSummary, BYTES_PER_PIXEL, Backend as BackendChoice, Frame, Renderer, Settings, adapters, still_supersample,
+};
 use autosplats_cloud::{Draft, available_memory, total_memory};
 use autosplats_formats::{formats, read, write, written_formats};
 use autosplats_scenes::Scene;
@@ -16,11 +18,14 @@ use crate::exit::{Exit, Failure};
 use crate::info::wrapped;
 use crate::render::scene_camera;
 
-/// Least memory of a point in bytes: position and colour.
+/// Memory of a point in bytes while a file is read and rendered: position and colour.
 const BYTES_PER_POINT: u64 = 12 + 3;
 
-/// Peak memory of the program over that of the points, while it reads a file and renders it.
-const PEAK_MEMORY_RATIO: f64 = 2.3;
+/// Memory that the program takes beside points and pictures, in bytes.
+const PROGRAM_BYTES: u64 = 40 << 20;
+
+/// Size of the largest picture that is supersampled by default, in pixels.
+const PICTURE: [u32; 2] = [1920, 1080];
 
 /// Points and pixels of the self-test.
 const TEST_POINTS: usize = 20_000;
@@ -67,7 +72,11 @@ struct Cpu {
 struct Memory {
     total: Option<u64>,
     available: Option<u64>,
-    /// Points of the largest coloured cloud that fits into the available memory for rendering.
+    /// Memory that rendering takes: of the program, of each coloured point, and at most of a still of `PICTURE`.
+    program: u64,
+    per_point: u64,
+    picture: u64,
+    /// Points of the largest coloured cloud that can be rendered to such a still in the available memory.
     largest_cloud: Option<u64>,
 }
 
@@ -126,6 +135,8 @@ impl Findings {
         let Device { name, threads, simd, .. } = Device::cpu();
         let (simd_used, lanes) = simd_used();
         let available = available_memory();
+        let [width, height] = PICTURE.map(|side| u64::from(side * still_supersample(PICTURE)));
+        let picture = width * height * BYTES_PER_PIXEL;
         let adapters = adapters();
         let about = "renders on the processor, all features".into();
         Self {
@@ -141,8 +152,10 @@ impl Findings {
             memory: Memory {
                 total: total_memory(),
                 available,
-                largest_cloud: available
-                    .map(|bytes| (bytes as f64 / (BYTES_PER_POINT as f64 * PEAK_MEMORY_RATIO)) as u64),
+                program: PROGRAM_BYTES,
+                per_point: BYTES_PER_POINT,
+                picture,
+                largest_cloud: available.map(|bytes| bytes.saturating_sub(PROGRAM_BYTES + picture) / BYTES_PER_POINT),
             },
             self_test,
             terminal: Terminal {
@@ -184,16 +197,18 @@ impl Findings {
             lanes => format!("{lanes} numbers at a time"),
         };
         line(*lanes > 1, "simd", format!("uses {simd_used}, {per}; found: {found}"));
-        let Memory { total, available, largest_cloud } = &self.memory;
+        let Memory { total, available, picture, largest_cloud, .. } = &self.memory;
         match (available, largest_cloud) {
             (Some(available), Some(points)) => {
                 let total = total.map_or_else(String::new, |total| format!(" of {}", gigabytes(total)));
                 let what = format!(
-                    "{}{total} available: about {} million coloured points can be rendered",
+                    "{}{total} available: up to {} million coloured points can be rendered, and octrees of any size; a \
+                     picture takes up to {}",
                     gigabytes(*available),
-                    points / 1_000_000
+                    points / 1_000_000,
+                    gigabytes(*picture)
                 );
-                line(true, "memory", what);
+                line(true, "memory", wrapped(&what, INDENT));
             }
             _ => line(false, "memory", "unknown here; too large a cloud ends the run without a message".into()),
         }

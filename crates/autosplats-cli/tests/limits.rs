@@ -132,6 +132,39 @@ fn what_a_file_has_lost_is_told() {
     }
 }
 
+/// Most memory in bytes that is a process's own while it runs. Pages of files are not: the system takes them back.
+fn peak(command: &mut Command) -> u64 {
+    let mut child = command.stdout(Stdio::null()).spawn().expect("the command starts");
+    let status = format!("/proc/{}/status", child.id());
+    let mut most = 0;
+    while child.try_wait().expect("the command ends").is_none() {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let own = text.lines().find_map(|line| line.strip_prefix("RssAnon:")?.strip_suffix("kB")?.trim().parse().ok());
+        most = most.max(own.unwrap_or(0_u64) << 10);
+        sleep(Duration::from_millis(1));
+    }
+    assert!(child.wait().expect("it has ended").success(), "{command:?}");
+    most
+}
+
+#[test]
+fn rendering_takes_the_memory_that_doctor_tells() {
+    const POINTS: u64 = 5_000_000;
+    let folder = Folder::new();
+    let told: serde_json::Value = serde_json::from_str(&folder.succeed(&["doctor", "--json"]).stdout).expect("JSON");
+    let told = |what: &str| told["memory"][what].as_u64().unwrap_or_else(|| panic!("{what}: {told}"));
+    folder.succeed(&["convert", &format!("scene:cathedral:{POINTS}"), "a.ply", "--quiet"]);
+    let small = ["--size", "80x60", "--supersample", "1", "--quiet"];
+    for name in ["a.ply", "a.las", "a.laz", "a.pcd", "a.copc.laz"] {
+        if name != "a.ply" {
+            folder.succeed(&["convert", "a.ply", name, "--quiet"]);
+        }
+        let taken = peak(&mut folder.command(&[&["render", name, "-o", "a.png"], &small[..]].concat()));
+        let expected = told("program") + POINTS * told("per_point");
+        assert!(taken.abs_diff(expected) < 64 << 20, "{name}: {taken} bytes, told were {expected}");
+    }
+}
+
 #[test]
 fn limits_of_memory() {
     let (folder, _) = with_files("20K");
