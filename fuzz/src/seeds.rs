@@ -49,6 +49,7 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         seeds("laz", [written("laz")?, las(true)?].concat()),
         seeds("copc", vec![trees::copc(&trees::nodes(300)).0]),
         seeds("ept", epts()?),
+        seeds("potree", potrees()?),
         seeds("e57", written("e57")?),
         seeds("ptx", vec![ptx()]),
         seeds("xyz", [written("xyz")?, vec![rows.clone().into_bytes()]].concat()),
@@ -240,6 +241,20 @@ fn epts() -> Result<Vec<Vec<u8>>> {
         Ok(files.into_iter().collect::<std::io::Result<Vec<_>>>()?.join(BETWEEN))
     };
     [("laszip", "laz"), ("binary", "bin"), ("zstandard", "zst")].into_iter().map(one).collect()
+}
+
+/// The files of octrees of Potree of one node, plain and compressed.
+fn potrees() -> Result<Vec<Vec<u8>>> {
+    let mut nodes = trees::nodes(POINTS);
+    nodes.retain(|key, _| key.level == 0);
+    let one = |encoding| {
+        let folder = tempfile::tempdir()?;
+        trees::write_potree(folder.path(), &nodes, encoding);
+        let files =
+            ["metadata.json", "hierarchy.bin", "octree.bin"].map(|name| std::fs::read(folder.path().join(name)));
+        Ok(files.into_iter().collect::<std::io::Result<Vec<_>>>()?.join(BETWEEN))
+    };
+    ["DEFAULT", "BROTLI"].into_iter().map(one).collect()
 }
 
 fn ptx() -> Vec<u8> {

@@ -2,9 +2,10 @@
 
 use std::{path::Path, sync::Arc, time::Duration};
 
-use autosplats_cloud::{Error, Folder, MemoryRanges, Progress, Traffic, Tree, Wanted};
+use autosplats_cloud::{Error, Folder, MemoryRanges, Progress, Ranges, Traffic, Tree, Wanted};
 use autosplats_formats::{
-    Part, ReadOptions, describe_bytes, describe_tree, open_ept_in, open_tree_in, read_bytes, read_mesh_bytes, read_part,
+    Part, ReadOptions, TREE_FILES, describe_bytes, describe_tree, open_folder_tree, open_tree_in, read_bytes,
+    read_mesh_bytes, read_part,
 };
 use autosplats_sources::{
     Next, Recording, RecordingOptions, Stream as _,
@@ -24,10 +25,10 @@ fn is_recording(name: &Path) -> bool {
     name.extension().is_some_and(|extension| extension == "mcap" || extension == "bag")
 }
 
-/// What separates the files of an EPT in one input.
+/// What separates the files of a folder's octree in one input.
 pub(crate) const BETWEEN: &[u8] = b"\n----\n";
 
-/// The files of an EPT: its metadata, one for all pages, and one for all nodes.
+/// The files of a folder's octree: its metadata, one for all pages, and one for all nodes.
 #[derive(Debug)]
 struct Files(Vec<Vec<u8>>);
 
@@ -45,6 +46,11 @@ impl Files {
         files.resize(3, Vec::new());
         Self(files)
     }
+
+    fn file(&self, name: &str) -> &Vec<u8> {
+        let index = if TREE_FILES.contains(&name) { 0 } else { 1 + usize::from(!name.contains("hierarchy")) };
+        &self.0[index]
+    }
 }
 
 impl Folder for Files {
@@ -54,12 +60,15 @@ impl Folder for Files {
 
     fn read(&self, names: &[String], most: u64, _: &dyn Progress) -> Result<Vec<Vec<u8>>, Error> {
         let file = |name: &String| {
-            let index = ["ept.json", "ept-hierarchy"].iter().position(|start| name.starts_with(start)).unwrap_or(2);
-            let file = &self.0[index];
+            let file = self.file(name);
             let fits = file.len() as u64 <= most;
             if fits { Ok(file.clone()) } else { Err(Error::unsupported(Path::new(name), "it is too large")) }
         };
         names.iter().map(file).collect()
+    }
+
+    fn open(&self, name: &str, _: &dyn Progress) -> Result<Arc<dyn Ranges>, Error> {
+        Ok(Arc::new(MemoryRanges::new(Path::new(name), self.file(name).clone())))
     }
 
     fn traffic(&self) -> Traffic {
@@ -71,7 +80,8 @@ impl Folder for Files {
 fn tree(name: &Path, bytes: &[u8]) -> Result<Option<Arc<dyn Tree>>, Error> {
     match name.extension().and_then(|extension| extension.to_str()) {
         Some("copc") => open_tree_in(Arc::new(MemoryRanges::new(name, bytes.to_vec())), &()),
-        Some("ept") => open_ept_in(Arc::new(Files::of(bytes)), &()).map(Some),
+        Some("ept") => open_folder_tree(Arc::new(Files::of(bytes)), TREE_FILES[0], &()).map(Some),
+        Some("potree") => open_folder_tree(Arc::new(Files::of(bytes)), TREE_FILES[1], &()).map(Some),
         _ => Ok(None),
     }
 }

@@ -1,11 +1,11 @@
-//! Files of a remote folder, each read whole.
+//! Files of a remote folder.
 
 use std::fmt;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use autosplats_cloud::{Error, Folder, Progress, Traffic, check_memory};
+use autosplats_cloud::{Error, Folder, Progress, Ranges, Traffic, check_memory};
 use flate2::read::MultiGzDecoder;
 
 use crate::address::Address;
@@ -15,6 +15,7 @@ use crate::fault::Fault;
 use crate::kept::Part;
 use crate::network::{Ask, Network, Received, Target, announces_more};
 use crate::patience::Stop;
+use crate::ranges::RemoteRanges;
 
 /// The folder of an address.
 pub(crate) struct RemoteFolder {
@@ -69,6 +70,10 @@ impl Folder for RemoteFolder {
             Some((_, name)) => Err(too_large(self.base.file(name).shown(), most)),
             None => Ok(read),
         }
+    }
+
+    fn open(&self, name: &str, progress: &dyn Progress) -> Result<Arc<dyn Ranges>, Error> {
+        Ok(Arc::new(RemoteRanges::of(self.base.file(name), &self.network, progress)?))
     }
 
     fn traffic(&self) -> Traffic {

@@ -47,7 +47,11 @@ impl fmt::Debug for RemoteRanges {
 
 impl RemoteRanges {
     pub(crate) fn open(address: &str, network: &Arc<Network>, progress: &dyn Progress) -> Result<Self, Error> {
-        let target = Target::new(Address::parse(address, &network.options)?, Arc::default());
+        Self::of(Address::parse(address, &network.options)?, network, progress)
+    }
+
+    pub(crate) fn of(address: Address, network: &Arc<Network>, progress: &dyn Progress) -> Result<Self, Error> {
+        let target = Target::new(address, Arc::default());
         let name = PathBuf::from(target.address.shown());
         let file = Arc::new(File { network: network.clone(), target });
         let (mut opened, opening) = (None, file.clone());

@@ -1,6 +1,6 @@
 //! Files behind addresses, and octrees: these are read in parts, all else whole.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use autosplats_cloud::{Error, PointCloud, Progress, Tree, Wanted};
@@ -8,9 +8,6 @@ use autosplats_formats::{Part, ReadOptions, open_tree as open_local, read_part, 
 
 /// Ways to reach a file, each the beginning of an address.
 const SCHEMES: [&str; 5] = ["http://", "https://", "s3://", "gs://", "az://"];
-
-/// Name of the file that describes an octree of many files.
-const EPT: &str = "ept.json";
 
 /// Octrees of fewer points in files are read whole, since that takes no longer than choosing a part.
 pub const MIN_TREE_POINTS: u64 = 20_000_000;
@@ -41,16 +38,11 @@ pub(crate) fn short_name(address: &str) -> String {
     path.rsplit('/').next().unwrap_or(path).into()
 }
 
-/// The file that describes a folder as an octree, if there is one.
-pub(crate) fn ept_in(folder: &Path) -> Option<PathBuf> {
-    Some(folder.join(EPT)).filter(|file| file.is_file())
-}
-
 /// Reads a local file whole.
 pub(crate) fn read_file(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
     // Other octrees are read whole as files, which is faster.
-    let is_ept = path.file_name().is_some_and(|name| name == EPT);
-    match is_ept.then(|| open_local(path, progress)).transpose()?.flatten() {
+    let is_json = path.extension().is_some_and(|extension| extension == "json");
+    match is_json.then(|| open_local(path, progress)).transpose()?.flatten() {
         Some(tree) => read_tree(&*tree, &Part::default(), options, progress),
         None => read_with(path, options, progress),
     }
@@ -76,7 +68,7 @@ mod open {
     use std::sync::{Mutex, PoisonError};
 
     use autosplats_cloud::{Ranges, check_memory};
-    use autosplats_formats::{open_ept_in, open_tree_in, read_bytes};
+    use autosplats_formats::{TREE_FILES, open_folder_tree, open_tree_in, read_bytes};
     use autosplats_remote::{Client, Header, RemoteOptions};
 
     use super::*;
@@ -106,8 +98,9 @@ mod open {
         };
         let headers: Vec<Header> = options.headers.iter().map(header).collect::<Result<_, _>>()?;
         let client = client(&options.headers, headers);
-        if path(address).rsplit('/').next() == Some(EPT) {
-            return Ok(Found::Tree(open_ept_in(client.open_folder(address)?, progress)?));
+        let name = path(address).rsplit('/').next().unwrap_or_default();
+        if TREE_FILES.contains(&name) {
+            return Ok(Found::Tree(open_folder_tree(client.open_folder(address)?, name, progress)?));
         }
         let ranges = client.open(address, progress)?;
         Ok(match open_tree_in(ranges.clone(), progress)? {

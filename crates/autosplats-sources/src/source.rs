@@ -7,7 +7,7 @@ use std::{
 };
 
 use autosplats_cloud::{Error, PointCloud, Progress, Tree};
-use autosplats_formats::{ReadOptions, files_beside, open_tree, read_mesh};
+use autosplats_formats::{ReadOptions, files_beside, open_tree, read_mesh, tree_file};
 use autosplats_scenes::{SCENE_PREFIX, Scene};
 
 #[cfg(feature = "zenoh")]
@@ -119,7 +119,7 @@ impl Source {
     /// - `-` is standard input.
     /// - A path that [`is_recording`](crate::is_recording) accepts is a recording: `.mcap`, `.bag`, `.db3`, or the
     ///   folder of a ROS 2 bag.
-    /// - A folder with a file `ept.json` is one scan.
+    /// - A folder with [a file that describes an octree](autosplats_formats::TREE_FILES) is one scan.
     /// - Any other folder, and a pattern with `*` or `?` that is not itself a path, is a sequence.
     /// - Anything else is a file, which need not exist.
     ///
@@ -138,7 +138,7 @@ impl Source {
             Ok(Self::Address(name.into()))
         } else if is_recording(path) {
             Ok(Self::Recording(path.into()))
-        } else if let Some(file) = address::ept_in(path) {
+        } else if let Some(file) = tree_file(path).ok().flatten() {
             Ok(Self::File(file))
         } else if path.is_dir() || name.contains(['*', '?']) && !path.exists() {
             Ok(Self::Sequence(name.into()))

@@ -1,12 +1,13 @@
-//! Files below one address, each read whole.
+//! Files below one address.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use super::{Counter, Traffic};
+use super::{Counter, FileRanges, Ranges, Traffic};
 use crate::{Error, Progress, check_memory, read_small};
 
-/// Files below one address that are small enough to be read whole, on many threads at once.
+/// Files below one address, on many threads at once.
 pub trait Folder: Send + Sync + fmt::Debug {
     /// Path or address of the folder, for messages.
     fn name(&self) -> &Path;
@@ -18,6 +19,12 @@ pub trait Folder: Send + Sync + fmt::Debug {
     /// [`Error::Unsupported`] for a file of more than `most` bytes, [`Error::Io`], [`Error::Remote`],
     /// [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says so.
     fn read(&self, names: &[String], most: u64, progress: &dyn Progress) -> Result<Vec<Vec<u8>>, Error>;
+
+    /// Opens a file of which only parts are read. What is read of it counts for itself.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Remote`], [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says so.
+    fn open(&self, name: &str, progress: &dyn Progress) -> Result<Arc<dyn Ranges>, Error>;
 
     /// What has been read so far.
     fn traffic(&self) -> Traffic;
@@ -65,6 +72,10 @@ impl Folder for LocalFolder {
         names.iter().map(one).collect()
     }
 
+    fn open(&self, name: &str, _: &dyn Progress) -> Result<Arc<dyn Ranges>, Error> {
+        Ok(Arc::new(FileRanges::open(&self.path.join(name))?))
+    }
+
     fn traffic(&self) -> Traffic {
         self.read.traffic()
     }
@@ -84,5 +95,8 @@ mod tests {
         assert!(matches!(local.read(&["a/b".into()], 2, &()), Err(Error::Unsupported { .. })), "too large");
         assert!(matches!(local.read(&["c".into()], 2, &()), Err(Error::Io { .. })), "no such file");
         assert_eq!(local.traffic(), Traffic { requests: 1, bytes: 3 });
+        let ranges = local.open("a/b", &()).expect("a file");
+        assert_eq!((ranges.size(), ranges.read(&[1..3], &()).expect("inside")), (3, vec![vec![2, 3]]));
+        assert!(matches!(local.open("c", &()), Err(Error::Io { .. })), "no such file");
     }
 }

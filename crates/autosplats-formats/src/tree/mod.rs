@@ -6,18 +6,21 @@
 //! loaded. Nodes are decoded by the readers of files, with an origin and a scale of colours that suit the whole scan.
 //! What is odd about nodes is [watched](watch).
 
+mod columns;
 mod copc;
 mod describe;
 mod directory;
 mod ept;
 mod octree;
+mod paged;
 mod part;
+mod potree;
 mod walk;
 mod watch;
 
 use std::fs::File;
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use autosplats_cloud::{Error, FileRanges, Folder, LocalFolder, Progress, Ranges, Tree};
@@ -27,30 +30,41 @@ pub use self::{
     part::{Part, read_part},
 };
 
-/// Name of the file with the metadata of an EPT.
-const EPT: &str = "ept.json";
+/// Names of the files that describe a folder as an octree: EPT's, and Potree's.
+pub const TREE_FILES: [&str; 2] = ["ept.json", "metadata.json"];
 
-/// Bytes of the beginning of a file that tell whether it is the metadata of an EPT.
+/// Words of files that describe an octree, by which they are told from other JSON.
+const WORDS: [[&[u8]; 3]; 2] =
+    [[b"\"dataType\"", b"\"schema\"", b"\"span\""], [b"\"hierarchy\"", b"\"boundingBox\"", b"\"encoding\""]];
+
+/// Bytes of the beginning of a file that tell whether it describes an octree.
 const SNIFFED: u64 = 64 << 10;
 
-/// Opens a scan that is stored as an octree: COPC, or EPT by its `ept.json` or the folder of it. `None` if the file is
-/// another, or a COPC whose octree cannot be used, which is noted: such a file can be read whole.
+/// A format of octrees in folders.
+#[derive(Clone, Copy)]
+enum Kind {
+    Ept,
+    Potree,
+}
+
+/// Opens a scan that is stored as an octree: COPC, or a folder of EPT or Potree 2, by its name or by that of the file
+/// that describes it. `None` if the file is another, or a COPC whose octree cannot be used, which is noted: such a file
+/// can be read whole.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Malformed`] and [`Error::Unsupported`] for an EPT; and [`Error::Cancelled`] if `progress`
-/// says so.
+/// [`Error::Io`]; [`Error::Malformed`] and [`Error::Unsupported`] for EPT and Potree; and [`Error::Cancelled`] if
+/// `progress` says so.
 pub fn open_tree(path: &Path, progress: &dyn Progress) -> Result<Option<Arc<dyn Tree>>, Error> {
     if path.is_dir() {
-        let folder = || Arc::new(LocalFolder::new(path));
-        return path.join(EPT).is_file().then(|| open_ept_in(folder(), progress)).transpose();
+        return tree_file(path)?.map_or(Ok(None), |file| open_tree(&file, progress));
     }
     // What comes through a pipe can be read only once.
     if !path.metadata().map_err(|source| Error::Io { path: path.into(), source })?.is_file() {
         return Ok(None);
     }
-    if let Some(name) = ept_name(path)? {
+    if let Some((kind, name)) = described(path)? {
         let folder = Arc::new(LocalFolder::new(path.parent().unwrap_or(Path::new(""))));
-        return Ok(Some(Arc::new(ept::open(folder, &name, progress)?)));
+        return open_kind(kind, folder, &name, progress).map(Some);
     }
     match open_tree_in(Arc::new(FileRanges::open(path)?), progress) {
         Err(Error::Malformed { place, what, .. }) => {
@@ -61,15 +75,40 @@ pub fn open_tree(path: &Path, progress: &dyn Progress) -> Result<Option<Arc<dyn 
     }
 }
 
-/// The name of a file if it has the metadata of an EPT.
-fn ept_name(path: &Path) -> Result<Option<String>, Error> {
+/// The file that describes a folder as an octree, if there is one.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read.
+pub fn tree_file(folder: &Path) -> Result<Option<PathBuf>, Error> {
+    let [ept, other] = TREE_FILES.map(|name| folder.join(name));
+    if ept.is_file() {
+        return Ok(Some(ept));
+    }
+    // The other name is used for much else.
+    Ok(if other.is_file() && described(&other)?.is_some() { Some(other) } else { None })
+}
+
+/// The format and the name of a file if it describes an octree.
+fn described(path: &Path) -> Result<Option<(Kind, String)>, Error> {
+    let Some(name) = path.file_name().map(|name| name.to_string_lossy().into_owned()) else { return Ok(None) };
+    if name == TREE_FILES[0] {
+        return Ok(Some((Kind::Ept, name)));
+    }
     let mut start = Vec::new();
     let read = File::open(path).and_then(|file| file.take(SNIFFED).read_to_end(&mut start));
     read.map_err(|source| Error::Io { path: path.into(), source })?;
-    let has = |word: &[u8]| start.windows(word.len()).any(|bytes| bytes == word);
+    let has = |word: &&[u8]| start.windows(word.len()).any(|bytes| bytes == *word);
     let object = start.trim_ascii_start().starts_with(b"{");
-    let found = object && has(b"\"dataType\"") && has(b"\"schema\"") && has(b"\"span\"");
-    Ok(path.file_name().filter(|_| found).map(|name| name.to_string_lossy().into_owned()))
+    let kinds = [Kind::Ept, Kind::Potree].into_iter().zip(WORDS);
+    let found = kinds.into_iter().find(|(_, words)| object && words.iter().all(has));
+    Ok(found.map(|(kind, _)| (kind, name)))
+}
+
+fn open_kind(kind: Kind, folder: Arc<dyn Folder>, name: &str, progress: &dyn Progress) -> Result<Arc<dyn Tree>, Error> {
+    Ok(match kind {
+        Kind::Ept => Arc::new(ept::open(folder, name, progress)?),
+        Kind::Potree => Arc::new(potree::open(folder, name, progress)?),
+    })
 }
 
 /// Opens a file of which ranges can be read. `None` if it is no COPC.
@@ -80,10 +119,11 @@ pub fn open_tree_in(ranges: Arc<dyn Ranges>, progress: &dyn Progress) -> Result<
     Ok(copc::open(ranges, progress)?.map(|tree| Arc::new(tree) as Arc<dyn Tree>))
 }
 
-/// Opens the EPT whose `ept.json` is in a folder.
+/// Opens the octree that a file of a folder describes, which has one of the names [`TREE_FILES`].
 ///
 /// # Errors
-/// Those of reading, and [`Error::Malformed`] and [`Error::Unsupported`] for what the metadata state.
-pub fn open_ept_in(folder: Arc<dyn Folder>, progress: &dyn Progress) -> Result<Arc<dyn Tree>, Error> {
-    Ok(Arc::new(ept::open(folder, EPT, progress)?))
+/// Those of reading, and [`Error::Malformed`] and [`Error::Unsupported`] for what the file states.
+pub fn open_folder_tree(folder: Arc<dyn Folder>, name: &str, progress: &dyn Progress) -> Result<Arc<dyn Tree>, Error> {
+    let kind = if name == TREE_FILES[1] { Kind::Potree } else { Kind::Ept };
+    open_kind(kind, folder, name, progress)
 }

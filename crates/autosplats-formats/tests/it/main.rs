@@ -23,6 +23,7 @@ mod losses;
 mod meshes;
 mod oddities;
 mod parts;
+mod potree;
 mod progress;
 mod ptx;
 mod real_files;

@@ -4,13 +4,16 @@ use std::ops::Range;
 
 use autosplats_cloud::Key;
 
-use crate::{read::las::MAX_RATIO, tree::directory::Entry};
+use crate::{
+    read::las::MAX_RATIO,
+    tree::{
+        directory::Entry,
+        paged::{Page, Parsed},
+    },
+};
 
 /// Bytes of an entry.
-const ENTRY: usize = 32;
-
-/// Most bytes of pages that are in memory at once, before they are entries.
-pub(super) const MAX_PAGES: u64 = 64 << 20;
+pub(super) const ENTRY: usize = 32;
 
 /// What entries may name.
 pub(super) struct Limits {
@@ -20,23 +23,8 @@ pub(super) struct Limits {
     pub(super) record_len: u64,
 }
 
-/// Checks the place of a page.
-pub(super) fn check_page(offset: u64, bytes: u64, size: u64) -> Result<(), String> {
-    let end = offset.checked_add(bytes).filter(|&end| end <= size);
-    let whole = bytes > 0 && bytes.is_multiple_of(ENTRY as u64);
-    if end.is_none() {
-        Err(format!("a page of {bytes} bytes at byte {offset} reaches beyond the end; copy the file again"))
-    } else if bytes > MAX_PAGES {
-        Err(format!("a page of {bytes} bytes is too large; at most {MAX_PAGES} are read"))
-    } else if !whole {
-        Err(format!("a page of {bytes} bytes is not made of entries of {ENTRY} bytes; build the file again"))
-    } else {
-        Ok(())
-    }
-}
-
-/// The entries of a page. An error has the byte of the faulty entry, counted from the start of the page.
-pub(super) fn entries(page: &[u8], limits: &Limits, size: u64) -> Result<Vec<(Key, Entry)>, (usize, String)> {
+/// The entries of a page of a file of `size` bytes.
+pub(super) fn entries(page: &[u8], limits: &Limits, size: u64) -> Parsed {
     let (raw, _) = page.as_chunks::<ENTRY>();
     raw.iter().enumerate().map(|(index, raw)| entry(raw, limits, size).map_err(|what| (index * ENTRY, what))).collect()
 }
@@ -56,7 +44,7 @@ fn entry(raw: &[u8; ENTRY], limits: &Limits, size: u64) -> Result<(Key, Entry), 
     match points {
         -1 => {
             let bytes = length()?;
-            check_page(offset, bytes.into(), size)?;
+            Page { offset, bytes: bytes.into() }.check(size, ENTRY)?;
             Ok((key, Entry::Page { offset, bytes }))
         }
         // An inner node without points of its own.

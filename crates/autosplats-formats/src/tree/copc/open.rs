@@ -6,13 +6,17 @@ use std::sync::Arc;
 use autosplats_cloud::{Axes, Error, Key, Progress, Ranges, TreeInfo, shown_number};
 use glam::DVec3;
 
-use super::{Copc, Limits, check_page, hierarchy::MAX_PAGES, take_page};
+use super::{
+    Copc, Limits,
+    hierarchy::{ENTRY, entries},
+};
 use crate::{
     las,
     read::{Description, las::Head},
     tree::{
         directory::{Directory, Entry},
         octree::Octree,
+        paged::{MAX_PAGES, Page, take_page},
     },
 };
 
@@ -94,8 +98,8 @@ pub(crate) fn open(ranges: Arc<dyn Ranges>, progress: &dyn Progress) -> Result<O
     if points > size || points > MAX_PAGES || points < INFO.end as u64 {
         return Err(fail(96, format!("the points cannot begin at byte {points}; copy the file again")));
     }
-    check_page(info.root.start, info.root.end - info.root.start, size)
-        .map_err(|what| fail(INFO.start + 40, format!("hierarchy: {what}")))?;
+    let root = Page { offset: info.root.start, bytes: info.root.end - info.root.start };
+    root.check(size, ENTRY).map_err(|what| fail(INFO.start + 40, format!("hierarchy: {what}")))?;
     if points > start.len() as u64 {
         let more = one(start.len() as u64..points)?;
         start.extend(more);
@@ -122,7 +126,8 @@ pub(crate) fn open(ranges: Arc<dyn Ranges>, progress: &dyn Progress) -> Result<O
     }
     let limits = Limits { data: points..size, record_len: head.record_len() as u64 };
     let directory = Directory::new(Entry::Page { offset: info.root.start, bytes: page.len() as u32 });
-    take_page(&directory, Key::ROOT, info.root.start, &page, &limits, &*ranges)?;
+    let parse = |_, page: &[u8]| entries(page, &limits, size);
+    take_page(&directory, &*ranges, Key::ROOT, info.root.start, &page, parse)?;
     let octree = Octree::new(tree_info(&head, &info, notes), directory, head.height_scale);
     Ok(Some(Copc { ranges, head, limits, octree }))
 }

@@ -6,14 +6,11 @@ use autosplats_cloud::{Axes, Crs, CrsDefinition, Error, TreeInfo, excerpt, shown
 use glam::DVec3;
 use serde::Deserialize;
 
-use crate::read::{
-    Attribute, Description,
-    las::{Colors, Shape},
-    table::{MAX_COLUMNS, Scalar},
-    units,
-};
-
 use super::MAX_LAZ_HEAD;
+use crate::{
+    read::{Description, table::Scalar, units},
+    tree::columns::{Column, Columns},
+};
 
 /// Bytes of a LAZ file per byte of its points, at most; compression fails on random values.
 const MAX_LAZ_GROWTH: u64 = 2;
@@ -36,26 +33,11 @@ impl Encoding {
     }
 }
 
-/// A value of a point.
-#[derive(Clone, Debug)]
-pub(super) struct Column {
-    pub(super) name: String,
-    pub(super) scalar: Scalar,
-    /// Byte in a record.
-    pub(super) at: usize,
-    /// Scale and offset, unless they change nothing.
-    pub(super) scaled: Option<(f64, f64)>,
-}
-
 /// Contents of `ept.json`, checked as far as reading needs.
 #[derive(Debug)]
 pub(super) struct Meta {
     pub(super) encoding: Encoding,
-    /// Bytes of a record.
-    pub(super) stride: usize,
-    pub(super) xyz: [Column; 3],
-    pub(super) rgb: Option<[Column; 3]>,
-    pub(super) others: Vec<Column>,
+    pub(super) columns: Columns,
     raw: Raw,
 }
 
@@ -114,27 +96,7 @@ impl Dimension {
                 ));
             }
         };
-        let (scale, offset) = (self.scale.unwrap_or(1.0), self.offset.unwrap_or(0.0));
-        if scale == 0.0 || !scale.is_finite() || !offset.is_finite() {
-            return Err(format!("invalid scale {} or offset {}", shown_number(scale), shown_number(offset)));
-        }
-        let scaled = ((scale, offset) != (1.0, 0.0)).then_some((scale, offset));
-        Ok(Column { name: self.name.clone(), scalar, at, scaled })
-    }
-}
-
-impl Column {
-    fn attribute(&self) -> Attribute {
-        let stored = match self.scaled {
-            None => self.scalar.name().into(),
-            Some((scale, _)) => format!("{} × {}", self.scalar.name(), shown_number(scale)),
-        };
-        Attribute { name: self.name.clone(), stored }
-    }
-
-    /// Bytes of a value in the cloud.
-    fn size(&self) -> usize {
-        if self.scaled.is_some() { 8 } else { self.scalar.size() }
+        Column::new(&self.name, scalar, at, [self.scale.unwrap_or(1.0), self.offset.unwrap_or(0.0)])
     }
 }
 
@@ -164,29 +126,14 @@ impl Meta {
         if !(raw.span >= 1.0 && raw.span.is_finite()) {
             return Err(fail(format!("the span is {}; it must be 1 or more", shown_number(raw.span))));
         }
-        if raw.schema.len() > MAX_COLUMNS {
-            return Err(fail(format!("{} values a point; at most {MAX_COLUMNS}", raw.schema.len())));
-        }
-        let mut others: Vec<Column> = Vec::new();
-        let mut stride = 0;
+        let mut at = 0;
+        let mut list = Vec::new();
         for dimension in &raw.schema {
-            let mut column = dimension.column(stride).map_err(fail)?;
-            while others.iter().any(|other| other.name.eq_ignore_ascii_case(&column.name)) {
-                column.name.push('_');
-            }
-            stride += column.scalar.size();
-            others.push(column);
+            let column = dimension.column(at).map_err(fail)?;
+            at += column.scalar.size();
+            list.push(column);
         }
-        let mut take = |names: [&str; 3]| {
-            let at = |name: &str| others.iter().position(|column| column.name.eq_ignore_ascii_case(name));
-            let [Some(a), Some(b), Some(c)] = names.map(at) else { return None };
-            let taken = [a, b, c].map(|index| others[index].clone());
-            others.retain(|column| taken.iter().all(|other| other.at != column.at));
-            Some(taken)
-        };
-        let xyz = take(["X", "Y", "Z"]).ok_or_else(|| fail("there are no X, Y and Z in the schema".into()))?;
-        let rgb = take(["Red", "Green", "Blue"]);
-        Ok(Self { encoding, stride, xyz, rgb, others, raw })
+        Ok(Self { encoding, columns: Columns::new(list).map_err(fail)?, raw })
     }
 
     /// What the metadata state, the coordinate system of nodes, and the factor of their heights.
@@ -199,13 +146,12 @@ impl Meta {
         if size.max_element() > 1.001 * size.min_element() {
             notes.push("the root is no cube; its spacing is that along x".into());
         }
-        let scales = self.xyz.each_ref().map(|column| column.scaled.map(|(scale, _)| scale.abs()));
         let attributes = raw.schema.iter().filter_map(|dimension| Some(dimension.column(0).ok()?.attribute()));
         let mut description = Description {
             bounds: Some(raw.bounds_conforming.map_or(cube, corners)),
             attributes: attributes.collect(),
             crs: crs.clone(),
-            resolution: if let [Some(x), Some(y), Some(z)] = scales { Some(DVec3::new(x, y, z)) } else { None },
+            resolution: self.columns.resolution(),
             notes,
             ..Description::default()
         };
@@ -219,8 +165,8 @@ impl Meta {
             bounds: description.bounds.unwrap_or(cube),
             spacing: size.x / raw.span,
             attributes: description.attributes.into_iter().map(|value| (value.name, value.stored)).collect(),
-            colors: self.rgb.is_some(),
-            fields: self.others.iter().map(|column| column.name.clone()).collect(),
+            colors: self.columns.rgb.is_some(),
+            fields: self.columns.others.iter().map(|column| column.name.clone()).collect(),
             axes: Some(Axes::ZUp),
             crs: description.crs,
             resolution: description.resolution,
@@ -243,24 +189,15 @@ impl Meta {
 
     /// Bytes of a node with so many points, an estimate where they are compressed.
     pub(super) fn stored_bytes(&self, points: u32) -> u64 {
-        let plain = u64::from(points) * self.stride as u64;
+        let plain = u64::from(points) * self.columns.stride as u64;
         if self.encoding == Encoding::Binary { plain } else { plain / 4 }
     }
 
     /// Most bytes of a node with so many points.
     pub(super) fn most_bytes(&self, points: u32) -> u64 {
         // Records of LAZ may have values that the schema leaves out.
-        let record = self.stride.max(usize::from(u8::MAX)) as u64;
+        let record = self.columns.stride.max(usize::from(u8::MAX)) as u64;
         MAX_LAZ_HEAD + MAX_LAZ_GROWTH * u64::from(points) * record
-    }
-
-    /// Most bytes of memory that a decoded point takes.
-    pub(super) fn point_bytes(&self, exact: bool, residuals: bool, shape: &Shape<'_>) -> usize {
-        let colors = self.rgb.is_some() && shape.colors != Colors::Unwanted;
-        let needs = |column: &&Column| shape.wanted.is_none_or(|wanted| wanted.needs(&column.name));
-        let fields: usize = self.others.iter().filter(needs).map(Column::size).sum();
-        let color = if exact { 9 } else { 3 };
-        (if residuals { 24 } else { 12 }) + if colors { color } else { 0 } + fields
     }
 }
 
@@ -282,7 +219,7 @@ mod tests {
             {"name":"Intensity","type":"unsigned","size":2}],"srs":{"authority":"EPSG","horizontal":"32632"}}"#;
         let read = |text: &str| Meta::read("ept.json".as_ref(), text.as_bytes());
         let meta = read(good).expect("it is sound");
-        assert_eq!((meta.stride, meta.others[0].at, meta.info().0.spacing), (16, 14, 0.0625));
+        assert_eq!((meta.columns.stride, meta.columns.others[0].at, meta.info().0.spacing), (16, 14, 0.0625));
         assert_eq!(meta.info().0.cube, Key::ROOT.cube([DVec3::ZERO, DVec3::splat(8.0)]));
         assert_eq!(meta.info().1.epsg, Some(32_632));
         for (from, to, words) in [

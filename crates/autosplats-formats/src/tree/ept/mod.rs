@@ -106,7 +106,7 @@ impl Octal for Ept {
             Encoding::Laz => read_shaped(&path, bytes, exact, shape)?,
             Encoding::Binary | Encoding::Zstandard => {
                 let unpacked = guard(|| records::unpacked(&self.meta, bytes, points)).map_err(fail)?;
-                self.meta.decode(&unpacked, exact, shape)?
+                self.meta.columns.decode(&unpacked, exact, shape)?
             }
         };
         let found = decoded.cloud.len();
@@ -169,7 +169,7 @@ impl Tree for Ept {
     fn point_bytes(&self, wanted: &Wanted) -> usize {
         let colors = if wanted.colors { Colors::ByValue } else { Colors::Unwanted };
         let residuals = wanted.exact || self.crs.height_scale().is_some();
-        self.meta.point_bytes(wanted.exact, residuals, &Shape { origin: None, colors, wanted: Some(wanted) })
+        self.meta.columns.point_bytes(wanted.exact, residuals, &Shape { origin: None, colors, wanted: Some(wanted) })
     }
 
     fn take_notes(&self) -> Vec<String> {

@@ -155,6 +155,105 @@ pub(crate) fn with_page(bytes: &mut Vec<u8>, entries: &[Entry]) -> (u64, i32) {
     (at, len as i32)
 }
 
+/// Writes an octree of Potree, whose nodes are of this encoding. The children of the root have pages of their own.
+pub(crate) fn write_potree(folder: &Path, nodes: &Nodes, encoding: &str) {
+    let attribute = |name: &str, kind: &str, size: usize, count: usize| {
+        format!(
+            r#"{{"name":"{name}","type":"{kind}","size":{},"elementSize":{size},"numElements":{count}}}"#,
+            size * count
+        )
+    };
+    let attributes = [
+        attribute("position", "int32", 4, 3),
+        attribute("intensity", "uint16", 2, 1),
+        attribute("classification", "uint8", 1, 1),
+        attribute("rgb", "uint16", 2, 3),
+    ]
+    .join(",");
+    let octant = |key: &Key| (key.x & 1) << 2 | (key.y & 1) << 1 | key.z & 1;
+    let (mut pages, mut data) = (BTreeMap::new(), Vec::new());
+    for page in nodes.keys().filter(|key| key.level <= 1) {
+        let (mut level, mut list) = (vec![*page], Vec::new());
+        while !level.is_empty() {
+            let mut next = Vec::new();
+            for key in level {
+                let is_proxy = *page == Key::ROOT && key.level == 1;
+                let mut children: Vec<Key> = key.children().filter(|child| nodes.contains_key(child)).collect();
+                children.sort_by_key(octant);
+                let mask = children.iter().fold(0, |mask, child| mask | 1_u8 << octant(child));
+                list.push((key, is_proxy, mask));
+                next.extend(children.into_iter().filter(|_| !is_proxy));
+            }
+            level = next;
+        }
+        pages.insert(*page, list);
+    }
+    let mut places = BTreeMap::new();
+    for (key, points) in nodes {
+        let stored = if encoding == "BROTLI" { packed(points) } else { points.iter().flat_map(record).collect() };
+        let stored = if points.is_empty() { Vec::new() } else { stored };
+        places.insert(*key, [data.len(), stored.len()]);
+        data.extend(stored);
+    }
+    let mut at = 0;
+    let starts: BTreeMap<Key, [usize; 2]> = pages
+        .iter()
+        .map(|(key, list)| {
+            at += 22 * list.len();
+            (*key, [at - 22 * list.len(), 22 * list.len()])
+        })
+        .collect();
+    let mut hierarchy: Vec<u8> = Vec::new();
+    for (key, is_proxy, mask) in pages.values().flatten() {
+        let kind = if *is_proxy { 2 } else { u8::from(*mask == 0) };
+        hierarchy.extend([kind, *mask]);
+        hierarchy.extend((nodes[key].len() as u32).to_le_bytes());
+        let place = if *is_proxy { starts[key] } else { places[key] };
+        hierarchy.extend(place.map(|number| (number as u64).to_le_bytes()).as_flattened());
+    }
+    let [low, high] = CUBE.map(|corner| corner.to_array());
+    let points: usize = nodes.values().map(Vec::len).sum();
+    let meta = format!(
+        r#"{{"version":"2.0","name":"a","points":{points},"projection":"EPSG:32632","encoding":"{encoding}",
+            "hierarchy":{{"firstChunkSize":{},"stepSize":1,"depth":{DEEPEST}}},"offset":{low:?},
+            "scale":[{SCALE},{SCALE},{SCALE}],"spacing":{},"boundingBox":{{"min":{low:?},"max":{high:?}}},
+            "attributes":[{attributes}]}}"#,
+        starts[&Key::ROOT][1],
+        64.0 / SPAN
+    );
+    for (name, bytes) in [("metadata.json", meta.as_bytes()), ("hierarchy.bin", &hierarchy), ("octree.bin", &data)] {
+        std::fs::write(folder.join(name), bytes).unwrap();
+    }
+}
+
+/// A compressed node of Potree, in blocks that Brotli stores as they are.
+fn packed(points: &[Sample]) -> Vec<u8> {
+    let woven = |numbers: [u32; 3], from: u32| {
+        let bit = |index: u32| u64::from(numbers[index as usize % 3] >> (from + index / 3) & 1) << index;
+        (0..48).map(bit).sum::<u64>().to_le_bytes()
+    };
+    let records: Vec<Vec<u8>> = points.iter().map(record).collect();
+    let whole = |record: &[u8], axis: usize| u32::from_le_bytes(record[4 * axis..4 * axis + 4].try_into().unwrap());
+    let places = records.iter().flat_map(|record| {
+        let numbers = [0, 1, 2].map(|axis| whole(record, axis));
+        [woven(numbers, 16), woven(numbers, 0)].concat()
+    });
+    let intensities = records.iter().flat_map(|record| record[12..14].to_vec());
+    let classes = records.iter().map(|record| record[14]);
+    let colors = points.iter().flat_map(|point| woven(point.color.map(u32::from), 0));
+    let plain: Vec<u8> = places.chain(intensities).chain(classes).chain(colors).collect();
+    let mut bytes = Vec::new();
+    for (index, block) in plain.chunks(1 << 16).enumerate() {
+        // A window of 16 bits, then: not the last block, four digits of length, stored.
+        let len = block.len() as u32 - 1;
+        let header = if index == 0 { len << 4 | 1 << 20 } else { len << 3 | 1 << 19 };
+        bytes.extend(&header.to_le_bytes()[..3]);
+        bytes.extend(block);
+    }
+    bytes.push(3);
+    bytes
+}
+
 /// Writes an EPT, whose nodes are of this type. The children of the root have pages of their own.
 pub(crate) fn write_ept(folder: &Path, nodes: &Nodes, kind: &str) {
     for name in ["ept-hierarchy", "ept-data"] {
