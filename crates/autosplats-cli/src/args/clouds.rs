@@ -71,11 +71,11 @@ pub(crate) struct RoomArgs {
 #[derive(Args, Clone, Copy, Debug, Default)]
 #[command(next_help_heading = "Part of the input")]
 pub(crate) struct PartArgs {
-    /// Keep the points inside a box of world coordinates, given by its lower and its upper corner. Of octrees (COPC,
-    /// EPT) only what the box needs is read
+    /// Keep the points inside a box of world coordinates, given by its lower and its upper corner. Of octrees
+    /// only what the box needs is read
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds, allow_hyphen_values = true)]
     pub(crate) bounds: Option<[DVec3; 2]>,
-    /// Read octrees (COPC, EPT) only as far as neighbouring points are SIZE apart, in the input's units
+    /// Read octrees only as far as neighbouring points are SIZE apart, in the input's units
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
     pub(crate) spacing: Option<f64>,
     /// Take what is left of inputs that are cut off or damaged, instead of failing

@@ -12,7 +12,7 @@ use crate::values;
 pub(super) const INPUT_HELP: &str = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
 generated scene as scene:NAME[:COUNT][@SECONDS], such as scene:herd:2M. SECONDS is the moment of an animated scene, as in \
-scene:figure@1.5. Also an address (https://, s3:// …); of COPC and EPT, only the parts that are needed are read. For points that move: a folder, a quoted file pattern, a recording (.mcap .bag), or - for PLY and PCD \
+scene:figure@1.5. Also an address (https://, s3:// …); of COPC, EPT and Potree 2, only the parts that are needed are read. For points that move: a folder, a quoted file pattern, a recording (.mcap .bag), or - for PLY and PCD \
 on standard input. Several inputs are merged.";
 
 /// Pose, reading and playing of inputs.
@@ -87,12 +87,12 @@ pub(crate) struct ReadingArgs {
     pub(crate) keep_no_returns: bool,
 }
 
-/// Scans that are stored as octrees (COPC, EPT), of any size.
+/// Scans that are stored as octrees (COPC, EPT, Potree 2), of any size.
 #[derive(Args, Clone, Copy, Debug, Default)]
 #[command(next_help_heading = "Scans larger than memory")]
 pub(crate) struct TreeArgs {
-    /// Largest distance between neighbouring points on the screen, in pixels of the written picture: octrees (COPC,
-    /// EPT) are read as far as this needs; 0 reads all points [default: 1; without --points-budget, 0 for files of less
+    /// Largest distance between neighbouring points on the screen, in pixels of the written picture: octrees
+    /// are read as far as this needs; 0 reads all points [default: 1; without --points-budget, 0 for files of less
     /// than 20 million points]
     #[arg(long, value_name = "PX", value_parser = values::detail, allow_negative_numbers = true)]
     detail: Option<f64>,

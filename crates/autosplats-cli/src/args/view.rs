@@ -29,8 +29,8 @@ pub(crate) struct ViewArgs {
         value_name = "INPUT",
         help = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
-generated scene as scene:NAME[:COUNT][@SECONDS]. Also an address (https://, s3:// …). Of large COPC and EPT, what the \
-view needs is read. For points that move: a folder, a quoted file pattern, a recording \
+generated scene as scene:NAME[:COUNT][@SECONDS]. Also an address (https://, s3:// …). Of large octrees (COPC, EPT, \
+Potree 2), what the view needs is read. For points that move: a folder, a quoted file pattern, a recording \
 (.mcap .bag), or - for PLY and PCD on standard input. Without an input the window opens empty; drop files on it."
     )]
     pub(crate) inputs: Vec<String>,

@@ -220,17 +220,43 @@ fn write_ept(folder: &Folder, points: usize) {
     folder.write("ept/ept-hierarchy/0-0-0-0.json", &serde_json::json!({"0-0-0-0": points}).to_string());
 }
 
+/// Writes an octree of Potree of one node, whose points, in the box from 0 to 1000, have a class each.
+fn write_potree(folder: &Folder, points: &[([f64; 3], u8)]) {
+    let attribute = |name, kind, size, count| serde_json::json!({"name": name, "type": kind, "size": size, "numElements": count, "elementSize": size / count});
+    let described = serde_json::json!({
+        "version": "2.0", "points": points.len(), "encoding": "DEFAULT", "projection": "", "spacing": 8,
+        "hierarchy": {"firstChunkSize": 22, "stepSize": 4, "depth": 0}, "offset": [0, 0, 0],
+        "scale": [0.001, 0.001, 0.001], "boundingBox": {"min": [0, 0, 0], "max": [1000, 1000, 1000]},
+        "attributes": [attribute("position", "int32", 12, 3), attribute("classification", "uint8", 1, 1)],
+    });
+    let record = |(at, class): &([f64; 3], u8)| {
+        let stored = at.map(|along| ((along * 1000.0).round() as i32).to_le_bytes());
+        [stored.as_flattened(), &[*class]].concat()
+    };
+    let nodes: Vec<u8> = points.iter().flat_map(record).collect();
+    let count = (points.len() as u32).to_le_bytes();
+    let node = [&[1, 0][..], &count, &[0; 8], &(nodes.len() as u64).to_le_bytes()].concat();
+    fs::create_dir_all(folder.path("potree")).expect("a folder");
+    folder.write("potree/metadata.json", &described.to_string());
+    fs::write(folder.path("potree/hierarchy.bin"), node).expect("written");
+    fs::write(folder.path("potree/octree.bin"), nodes).expect("written");
+}
+
 #[test]
 fn points_that_are_left_out_of_octrees_are_told() {
     let folder = Folder::new();
-    let wall = (0..400).map(|i| format!("{} {} {} {}", i % 20, 0.1 * f64::from(i % 7), 1 + i / 20, 2));
-    let noise = (0..40).map(|i| format!("{} 0 {} 7", 0.1 * f64::from(i % 5), 900.0 + 0.1 * f64::from(i / 5)));
+    let wall = (0..400).map(|i| ([f64::from(i % 20), 0.1 * f64::from(i % 7), f64::from(1 + i / 20)], 2));
+    let noise = (0..40).map(|i| ([0.1 * f64::from(i % 5), 0.0, 900.0 + 0.1 * f64::from(i / 5)], 7));
+    let points: Vec<([f64; 3], u8)> = wall.chain(noise).collect();
     let columns = ["float x", "float y", "float z", "uchar classification"];
-    folder.write("wall.ply", &ply(&columns, wall.chain(noise)));
+    let row = |([x, y, z], class): &([f64; 3], u8)| format!("{x} {y} {z} {class}");
+    folder.write("wall.ply", &ply(&columns, points.iter().map(row)));
     folder.succeed(&["convert", "wall.ply", "node.laz"]);
-    write_ept(&folder, 440);
+    write_ept(&folder, points.len());
+    write_potree(&folder, &points);
     let server = Server::start(folder.path(""), Duration::ZERO).expect("a server");
-    for name in ["ept", "ept/ept.json", &server.address("ept/ept.json")] {
+    let addresses = ["ept/ept.json", "potree/metadata.json"].map(|name| server.address(name));
+    for name in ["ept", "ept/ept.json", "potree", "potree/metadata.json", &addresses[0], &addresses[1]] {
         let picture = |more: &[&str]| {
             let usual = ["render", name, "-o", "a.png", "--size", "64x48", "--supersample", "1", "--detail", "1"];
             folder.succeed(&[&usual[..], more].concat()).stderr

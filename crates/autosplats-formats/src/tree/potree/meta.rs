@@ -148,6 +148,8 @@ impl Attribute {
                 return Err(format!("'{name}' is of type '{}', which is not read", excerpt(other.as_bytes())));
             }
         };
+        // LAS's angles have a sign, which PotreeConverter does not state.
+        let scalar = if self.name == "scan angle rank" && scalar == U8 { I8 } else { scalar };
         let fits = (1..=MAX_COLUMNS).contains(&self.num_elements) && self.size == self.num_elements * scalar.size();
         if !fits {
             let (name, size) = (excerpt(self.name.as_bytes()), self.size);
