@@ -33,8 +33,8 @@ const TO_GIVEN: &str = "to the given sensor";
 
 /// Reads the inputs, estimates, and writes the file.
 pub(crate) fn run(args: &NormalsArgs, console: &Console) -> Result<(), Failure> {
-    let NormalsArgs { paths, input, force, k, orient, sensor, part, room, run: _ } = args;
-    let (inputs, output) = Inputs::with_output(paths, None, input, part)?;
+    let NormalsArgs { paths, input, output, force, k, orient, sensor, part, room, run: _ } = args;
+    let (inputs, output) = Inputs::with_output(paths, output.as_deref(), input, part)?;
     if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pts")) {
         return Err(Failure::usage(format!(
             "{}: PTS cannot hold normals; write .xyz, .ply or another format",

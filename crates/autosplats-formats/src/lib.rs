@@ -32,7 +32,9 @@ pub use read::{
     files_beside, formats, framing, gltf_animation, is_named_as_points, open_parts, open_parts_of, read, read_bytes,
     read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with, table,
 };
-pub use tree::{Part, TREE_FILES, describe_tree, open_folder_tree, open_tree, open_tree_in, read_part, tree_file};
+pub use tree::{
+    Part, TREE_FILES, describe_tree, is_tree_file, open_folder_tree, open_tree, open_tree_in, read_part, tree_file,
+};
 pub use write::{
     TreeInput, TreeOptions, TreeSummary, check_writable, write, write_clouds, write_tree, written_formats,
 };

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use autosplats_cloud::{Error, PointCloud, Progress, Tree, Wanted};
-use autosplats_formats::{Part, ReadOptions, open_tree as open_local, read_part, read_with};
+use autosplats_formats::{Part, ReadOptions, is_tree_file, open_tree as open_local, read_part, read_with};
 
 /// Ways to reach a file, each the beginning of an address.
 const SCHEMES: [&str; 5] = ["http://", "https://", "s3://", "gs://", "az://"];
@@ -41,8 +41,7 @@ pub(crate) fn short_name(address: &str) -> String {
 /// Reads a local file whole.
 pub(crate) fn read_file(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
     // Other octrees are read whole as files, which is faster.
-    let is_json = path.extension().is_some_and(|extension| extension == "json");
-    match is_json.then(|| open_local(path, progress)).transpose()?.flatten() {
+    match is_tree_file(path).then(|| open_local(path, progress)).transpose()?.flatten() {
         Some(tree) => read_tree(&*tree, &Part::default(), options, progress),
         None => read_with(path, options, progress),
     }

@@ -138,7 +138,7 @@ impl Source {
             Ok(Self::Address(name.into()))
         } else if is_recording(path) {
             Ok(Self::Recording(path.into()))
-        } else if let Some(file) = tree_file(path).ok().flatten() {
+        } else if let Some(file) = tree_file(path) {
             Ok(Self::File(file))
         } else if path.is_dir() || name.contains(['*', '?']) && !path.exists() {
             Ok(Self::Sequence(name.into()))

@@ -128,6 +128,9 @@ pub(crate) struct NormalsArgs {
     pub(crate) paths: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
+    /// File to write, instead of the last name; then all names are inputs
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: Option<PathBuf>,
     /// Number of neighbours that the plane of each point is fitted to, 3 to 1024; more is smoother
     #[arg(short, value_name = "COUNT", value_parser = values::normal_neighbors, default_value_t = NormalSettings::default().k, allow_negative_numbers = true, help_heading = "Normals")]
     pub(crate) k: u32,

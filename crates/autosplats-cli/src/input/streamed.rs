@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use autosplats_cloud::glam::DMat4;
 use autosplats_cloud::{Clouds, Error, Merged, Outline, Part, PointCloud, Progress};
-use autosplats_formats::{Parts, TreeInput, describe, open_parts};
+use autosplats_formats::{Parts, TreeInput, describe, is_tree_file, open_parts};
 use autosplats_scenes::Scene;
 use autosplats_sources::{Input, Source};
 
@@ -104,9 +104,10 @@ fn parts_of<'a>(input: &'a Input, progress: &dyn Progress) -> Result<Option<Box<
     }
 }
 
-/// Whether the input has no pose and is not sampled.
+/// Whether the input has no pose, is not sampled, and is no octree of many files.
 fn is_plain(input: &Input) -> bool {
-    input.world_from_input == DMat4::IDENTITY && !is_made(input)
+    let is_folder = matches!(&input.source, Source::File(path) if is_tree_file(path));
+    input.world_from_input == DMat4::IDENTITY && !is_made(input) && !is_folder
 }
 
 fn streamed(input: &Input) -> TreeInput<'_> {

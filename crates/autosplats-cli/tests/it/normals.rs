@@ -59,7 +59,7 @@ fn a_sphere_has_its_own_normals() {
 #[test]
 fn normals_turn_to_a_sensor() {
     let folder = Folder::with_sphere();
-    folder.succeed(&["normals", "sphere.ply", "out.ply", "--sensor", "0,0,0", "--quiet"]);
+    folder.succeed(&["normals", "sphere.ply", "-o", "out.ply", "--sensor", "0,0,0", "--quiet"]);
     let (names, rows) = rows(&folder.read("out.ply"));
     let column = |name: &str| names.iter().position(|found| found == name).unwrap_or_else(|| panic!("no {name}"));
     let [x, nx] = ["x", "nx"].map(column);

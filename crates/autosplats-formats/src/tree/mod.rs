@@ -56,7 +56,7 @@ enum Kind {
 /// `progress` says so.
 pub fn open_tree(path: &Path, progress: &dyn Progress) -> Result<Option<Arc<dyn Tree>>, Error> {
     if path.is_dir() {
-        return tree_file(path)?.map_or(Ok(None), |file| open_tree(&file, progress));
+        return tree_file(path).map_or(Ok(None), |file| open_tree(&file, progress));
     }
     // What comes through a pipe can be read only once.
     if !path.metadata().map_err(|source| Error::Io { path: path.into(), source })?.is_file() {
@@ -76,16 +76,20 @@ pub fn open_tree(path: &Path, progress: &dyn Progress) -> Result<Option<Arc<dyn 
 }
 
 /// The file that describes a folder as an octree, if there is one.
-///
-/// # Errors
-/// [`Error::Io`] if it cannot be read.
-pub fn tree_file(folder: &Path) -> Result<Option<PathBuf>, Error> {
+#[must_use]
+pub fn tree_file(folder: &Path) -> Option<PathBuf> {
     let [ept, other] = TREE_FILES.map(|name| folder.join(name));
     if ept.is_file() {
-        return Ok(Some(ept));
+        return Some(ept);
     }
     // The other name is used for much else.
-    Ok(if other.is_file() && described(&other)?.is_some() { Some(other) } else { None })
+    Some(other).filter(|file| is_tree_file(file))
+}
+
+/// Whether a file describes a folder as an octree, so that its points are in other files.
+#[must_use]
+pub fn is_tree_file(path: &Path) -> bool {
+    path.is_file() && described(path).is_ok_and(|found| found.is_some())
 }
 
 /// The format and the name of a file if it describes an octree.
