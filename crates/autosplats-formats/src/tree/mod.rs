@@ -37,7 +37,8 @@ pub const TREE_FILES: [&str; 2] = ["ept.json", "metadata.json"];
 const WORDS: [[&[u8]; 3]; 2] =
     [[b"\"dataType\"", b"\"schema\"", b"\"span\""], [b"\"hierarchy\"", b"\"boundingBox\"", b"\"encoding\""]];
 
-/// Bytes of the beginning of a file that tell whether it describes an octree.
+/// Bytes of the beginning of a file that tell whether it is JSON, and whether it describes an octree.
+const FIRST: u64 = 64;
 const SNIFFED: u64 = 64 << 10;
 
 /// A format of octrees in folders.
@@ -99,12 +100,18 @@ fn described(path: &Path) -> Result<Option<(Kind, String)>, Error> {
         return Ok(Some((Kind::Ept, name)));
     }
     let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(SNIFFED).read_to_end(&mut start));
-    read.map_err(|source| Error::Io { path: path.into(), source })?;
+    let mut read = |most: u64| {
+        start.clear();
+        let read = File::open(path).and_then(|file| file.take(most).read_to_end(&mut start));
+        read.map_err(|source| Error::Io { path: path.into(), source })?;
+        Ok::<_, Error>(start.trim_ascii_start().starts_with(b"{"))
+    };
+    // Most files are no JSON.
+    if !read(FIRST)? || !read(SNIFFED)? {
+        return Ok(None);
+    }
     let has = |word: &&[u8]| start.windows(word.len()).any(|bytes| bytes == *word);
-    let object = start.trim_ascii_start().starts_with(b"{");
-    let kinds = [Kind::Ept, Kind::Potree].into_iter().zip(WORDS);
-    let found = kinds.into_iter().find(|(_, words)| object && words.iter().all(has));
+    let found = [Kind::Ept, Kind::Potree].into_iter().zip(WORDS).find(|(_, words)| words.iter().all(has));
     Ok(found.map(|(kind, _)| (kind, name)))
 }
 

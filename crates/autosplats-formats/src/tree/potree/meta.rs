@@ -81,7 +81,7 @@ struct Raw {
     scale: [f64; 3],
     #[serde(default)]
     spacing: f64,
-    bounding_box: Box,
+    bounding_box: Corners,
     encoding: String,
     attributes: Vec<Attribute>,
 }
@@ -93,7 +93,7 @@ struct Hierarchy {
 }
 
 #[derive(Debug, Deserialize)]
-struct Box {
+struct Corners {
     min: [f64; 3],
     max: [f64; 3],
 }
