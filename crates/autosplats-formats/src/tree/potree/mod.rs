@@ -60,7 +60,8 @@ pub(super) fn open(folder: Arc<dyn Folder>, name: &str, progress: &dyn Progress)
     let root = Page { offset: 0, bytes: meta.first_page };
     root.check(pages.size(), ENTRY).map_err(|what| Error::malformed(&path, "firstChunkSize", what))?;
     let directory = Directory::new(Entry::Page { offset: 0, bytes: root.bytes as u32 });
-    let page = pages.read(&[0..root.bytes], progress)?.concat();
+    let range = 0..root.bytes;
+    let page = pages.read(&[range], progress)?.concat();
     let size = pages.size();
     take_page(&directory, &*pages, Key::ROOT, 0, &page, |key, page| entries(key, page, &limits, size))?;
     let (info, height_scale) = meta.info();

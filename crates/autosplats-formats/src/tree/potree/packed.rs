@@ -51,7 +51,7 @@ fn woven(bytes: &[u8]) -> [u16; 3] {
     [0, 1, 2].map(|shift| {
         let mut bits = code >> shift & 0x2492_4924_9249;
         for (by, mask) in
-            [(2, 0x30c3_0c30_c30c3), (4, 0xf00f_00f0_0f00f), (8, 0xff_0000_ff00_00ff), (16, 0xffff_0000_ffff)]
+            [(2, 0x0003_0c30_c30c_30c3), (4, 0x000f_00f0_0f00_f00f), (8, 0xff_0000_ff00_00ff), (16, 0xffff_0000_ffff)]
         {
             bits = (bits | bits >> by) & mask;
         }
