@@ -44,7 +44,7 @@ use clap::Parser;
 use crate::mutate::{mutate, repair_pages};
 use crate::seeds::{Seeds, add_corpus, all};
 
-/// Time limit for an input: far more than a sound reader needs, far less than it takes to follow a false count.
+/// Limit of the processor's time for an input: far more than a sound reader needs, far less than it takes to follow a false count.
 const TIME: Duration = Duration::from_secs(2);
 
 /// Memory limit per byte of a file, in bytes, beyond `MEMORY`. Compression can put many points into a byte.
@@ -288,13 +288,11 @@ impl<'a> Run<'a> {
         let watcher = Watcher { chunks: random.modulo(8) == 0, notes: Mutex::default() };
 
         self.leave(name, &bytes)?;
-        let before = Instant::now();
-        let (outcome, memory) = meter::measured(|| {
+        let (outcome, time, memory) = meter::measured(|| {
             catch_unwind(AssertUnwindSafe(|| {
                 (target::describe(name, &bytes, &options), target::read(name, &bytes, &options, mesh, &watcher))
             }))
         });
-        let time = before.elapsed();
         self.slowest = self.slowest.max(time);
         self.most_memory = self.most_memory.max(memory);
 

@@ -1,8 +1,9 @@
-//! A global allocator that counts bytes.
+//! A global allocator that counts bytes, and the time of this thread.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
     sync::atomic::{AtomicUsize, Ordering::Relaxed},
+    time::Duration,
 };
 
 static NOW: AtomicUsize = AtomicUsize::new(0);
@@ -48,10 +49,25 @@ fn add(bytes: usize) {
     PEAK.fetch_max(now, Relaxed);
 }
 
-/// Runs `work`. Returns its result and the peak of allocated bytes beyond those at the start, of all threads.
-pub(crate) fn measured<T>(work: impl FnOnce() -> T) -> (T, usize) {
+/// Time that this thread has run. On a busy machine it waits for longer than any reader takes.
+#[cfg(unix)]
+fn time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+}
+
+/// Time since the first call.
+#[cfg(not(unix))]
+fn time() -> Duration {
+    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    START.get_or_init(std::time::Instant::now).elapsed()
+}
+
+/// Runs `work`. Returns its result, its time, and the peak of allocated bytes beyond those at the start, of all threads.
+pub(crate) fn measured<T>(work: impl FnOnce() -> T) -> (T, Duration, usize) {
     let before = NOW.load(Relaxed);
     PEAK.store(before, Relaxed);
+    let start = time();
     let outcome = work();
-    (outcome, PEAK.load(Relaxed).saturating_sub(before))
+    (outcome, time() - start, PEAK.load(Relaxed).saturating_sub(before))
 }
