@@ -52,6 +52,7 @@ mod thin;
 mod thinned;
 mod tiles;
 mod tree;
+mod zeros;
 
 pub use axes::Axes;
 pub use bytes::{Bytes, read_small};

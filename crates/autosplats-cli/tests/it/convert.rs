@@ -186,3 +186,41 @@ fn several_inputs_of_more_points_than_memory_holds_are_joined_in_parts() {
     folder.write("empty.xyz", "");
     folder.fail(&["convert", "a.laz", "empty.xyz", "-o", "b.las", "--memory", "5M"], 3, &["empty.xyz"]);
 }
+
+/// Of a tile whose class is 0 everywhere nothing is lost, but a PLY without classes has none.
+#[test]
+fn tiles_with_fields_of_zeros_are_joined() {
+    let folder = Folder::new();
+    let tile = |name: &str, class: u8| {
+        let rows: String = (0..400).map(|i| format!("{i} {} 1 {class} {}\n", i % 7, i % 3)).collect();
+        folder.write("tile.csv", &format!("x y z Classification ReturnNumber\n{rows}"));
+        folder.succeed(&["convert", "tile.csv", name]);
+    };
+    tile("ground.laz", 2);
+    tile("new.laz", 0);
+    folder.write("bare.xyz", "1 2 3\n4 5 6\n7 8 9\n");
+    for inputs in [["ground.laz", "new.laz"], ["new.laz", "ground.laz"]] {
+        for output in ["all.laz", "all.ply", "all.copc.laz"] {
+            let words = [&["convert"], &inputs[..], &["-o", output, "--force"]].concat();
+            let outcome = folder.succeed(&words);
+            assert!(!outcome.stderr.contains("left out"), "{inputs:?}: {}", outcome.stderr);
+            let info = folder.succeed(&["info", output, "--scan", "--json"]).stdout;
+            let info: serde_json::Value = serde_json::from_str(&info).expect("JSON");
+            let attributes = info["attributes"].as_array().expect("a list");
+            let class = attributes.iter().find(|one| one["name"] == "Classification").expect("classes");
+            assert_eq!((&class["min"], &class["max"]), (&0.0.into(), &2.0.into()), "{output}");
+            if output != "all.copc.laz" {
+                let whole = folder.read(output);
+                let outcome = folder.succeed(&[&words[..], &["--memory", "50K"]].concat());
+                assert!(folder.read(output) == whole, "in parts: {}", outcome.stderr);
+                assert!(!outcome.stderr.contains("left out"), "{inputs:?}: {}", outcome.stderr);
+            }
+        }
+    }
+    for memory in [&[][..], &["--memory", "50K"]] {
+        let words = ["convert", "ground.laz", "bare.xyz", "-o", "all.laz", "--force"];
+        let outcome = folder.succeed(&[&words[..], memory].concat());
+        let told = "ground.laz: not all inputs have ReturnNumber, Classification; left out";
+        assert!(outcome.stderr.contains(told), "{}", outcome.stderr);
+    }
+}
