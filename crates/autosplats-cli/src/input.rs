@@ -363,7 +363,7 @@ fn differences(clouds: &[&PointCloud]) -> Vec<(usize, String)> {
     let [first, others @ ..] = clouds else { return Vec::new() };
     let mut notes = Vec::new();
     for (index, cloud) in clouds.iter().enumerate() {
-        let lost = cloud.fields().iter().filter(|field| !clouds.iter().all(|other| other.field(&field.name).is_some()));
+        let lost = cloud.fields().iter().filter(|field| !clouds.iter().all(|other| other.knows(&field.name)));
         let lost: Vec<String> = lost.map(|field| field.name.escape_debug().take(40).collect()).collect();
         if !lost.is_empty() {
             let more = if lost.len() > MAX_LISTED_NAMES {

@@ -8,7 +8,7 @@ use autosplats::{
     NormalSettings, NormalsInParts, Orientation, PartsOptions, Viewpoint, estimate_normals, estimate_normals_in_parts,
 };
 use autosplats_cloud::{
-    Axes, Clouds, LocalMetres, Output, PointCloud, Progress, Scan, Thinned, Thinning, Unit, add_scans, check_memory,
+    Axes, Changed, Clouds, Output, PointCloud, Progress, Scan, Thinned, Thinning, Unit, add_scans, check_memory,
 };
 
 use crate::args::NormalsArgs;
@@ -78,11 +78,17 @@ fn in_parts(args: &NormalsArgs, parts: &Parts, output: Output<'_>, console: &Con
     let thinned = thinned.map_err(|error| failed(error.into()))?;
     let overview = Overview::of(&thinned).map_err(|error| failed(error.into()))?;
     let (orientation, towards) = overview.orientation(args.orient, args.sensor)?;
-    let local = InMetres { clouds: &thinned, map: overview.sample.local_metres(None) };
+    let in_metres = overview.sample.local_metres(None).map(|map| Changed {
+        clouds: &thinned,
+        change: Box::new(move |cloud: &mut PointCloud| {
+            cloud.to_metres_on(&map);
+        }),
+    });
+    let local: &dyn Clouds = in_metres.as_ref().map_or(&thinned, |changed| changed);
     let settings = NormalSettings { k: args.k, orientation };
     let options = PartsOptions { memory: parts.memory, folder: parts.folder.clone() };
     let bar = Bar::new("estimating normals", console);
-    let normals = estimate_normals_in_parts(&local, &settings, &options, &bar).map_err(|error| failed(error.into()))?;
+    let normals = estimate_normals_in_parts(local, &settings, &options, &bar).map_err(|error| failed(error.into()))?;
     drop(bar);
     let (points, tiles, in_doubt) = (normals.len(), normals.tiles(), normals.in_doubt());
     let bytes = parts.write(&WithNormals { clouds: &thinned, normals }, output, console)?;
@@ -159,35 +165,6 @@ impl Overview {
             Some(orientation) => Ok((orientation, "to the sensor")),
             None => orientation(&self.corners, choice, None),
         }
-    }
-}
-
-/// Points in metres on the ground, if they are in degrees.
-struct InMetres<'a> {
-    clouds: &'a dyn Clouds,
-    map: Option<LocalMetres>,
-}
-
-impl Clouds for InMetres<'_> {
-    fn name(&self) -> &Path {
-        self.clouds.name()
-    }
-
-    fn points(&self) -> Option<u64> {
-        self.clouds.points()
-    }
-
-    fn read(
-        &self,
-        progress: &dyn Progress,
-        take: &mut dyn FnMut(&PointCloud) -> Result<(), autosplats_cloud::Error>,
-    ) -> Result<(), autosplats_cloud::Error> {
-        let Some(map) = &self.map else { return self.clouds.read(progress, take) };
-        self.clouds.read(progress, &mut |cloud| {
-            let mut cloud = cloud.clone();
-            cloud.to_metres_on(map);
-            take(&cloud)
-        })
     }
 }
 

@@ -57,6 +57,14 @@ pub(crate) fn forced(path: &Path, force: bool) -> Output<'_> {
     Output { path, existing: if force { Existing::Replace } else { Existing::Keep } }
 }
 
+/// What the names of octrees end in.
+pub(crate) const TREE_ENDING: &str = ".copc.laz";
+
+/// Whether the name is that of an octree.
+pub(crate) fn is_tree(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().to_ascii_lowercase().ends_with(TREE_ENDING))
+}
+
 /// Whether there is a file with content. A power cut may have left an empty one.
 pub(crate) fn is_written(path: &Path) -> bool {
     path.metadata().is_ok_and(|metadata| metadata.len() > 0)

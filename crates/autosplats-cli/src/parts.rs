@@ -3,17 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Clouds, Error, Output, Part, Progress as _, Spool, available_memory, check_disk, usual_memory};
-use autosplats_formats::{ReadOptions, describe, write_clouds};
+use autosplats_formats::{ReadOptions, TreeInput, TreeOptions, describe, write_clouds, write_tree};
 
 use crate::args::{PartArgs, RoomArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
-use crate::output::{cannot_write, folder_of};
+use crate::output::{cannot_write, folder_of, is_tree};
 use crate::progress::Bar;
 
 /// Bytes that a point takes on the disk while it waits there, with all its values, in most scans.
 pub(crate) const SPOOLED_BYTES: u64 = 60;
+
+/// Least memory for making an octree of the results.
+const TREE_MEMORY: u64 = 256 << 20;
 
 /// Points that a sample has at most, if their number is known.
 const SAMPLE: u64 = 1 << 17;
@@ -75,12 +78,6 @@ pub(crate) fn parts(
         }
         return Ok(None);
     };
-    if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("e57")) {
-        if room.memory.is_some() {
-            console.note("--memory: E57 is written from memory; .laz and .ply are written in parts");
-        }
-        return Ok(None);
-    }
     let limit = limit.unwrap_or(u64::MAX);
     if points.saturating_mul(need.memory) <= limit {
         return Ok(None);
@@ -116,7 +113,15 @@ impl Parts {
     /// Writes the points, of which this work made `clouds`. Returns the size of the file in bytes.
     pub(crate) fn write(&self, clouds: &dyn Clouds, output: Output<'_>, console: &Console) -> Result<u64, Failure> {
         let bar = Bar::on_file("writing", output.path, console);
-        write_clouds(clouds, output, &bar).map_err(|error| self.failure(error, output.path))
+        let written = if is_tree(output.path) {
+            let temp = Some(self.folder.clone());
+            let options = TreeOptions { memory: self.memory.max(TREE_MEMORY), temp, ..TreeOptions::default() };
+            let inputs = vec![TreeInput::Clouds(Box::new(clouds))];
+            write_tree(inputs, output, &options, &bar).map(|summary| summary.bytes)
+        } else {
+            write_clouds(clouds, output, &bar)
+        };
+        written.map_err(|error| self.failure(error, output.path))
     }
 
     /// The failure of an error in the work.

@@ -46,6 +46,7 @@ impl PointCloud {
         for field in &mut self.fields {
             each_type!(&mut field.values, v => v.resize(before + added, Default::default()));
         }
+        self.settle_zeros();
         self.scans.extend(other.scans.into_iter().map(|mut scan| {
             scan.points = scan.points.start + before..scan.points.end + before;
             scan

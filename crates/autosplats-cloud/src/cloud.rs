@@ -33,6 +33,8 @@ pub struct PointCloud {
     pub(crate) residuals: Option<Vec<[f32; 3]>>,
     pub(crate) colors: Option<Vec<[u8; 3]>>,
     pub(crate) fields: Vec<Field>,
+    /// Names of values that are zero at every point.
+    pub(crate) zeros: Vec<String>,
     pub(crate) axes: Option<Axes>,
     pub(crate) scans: Vec<Scan>,
     pub(crate) crs: Crs,
@@ -81,6 +83,13 @@ pub struct Field {
     pub name: String,
     /// Values in the file's number type.
     pub values: FieldValues,
+}
+
+impl Field {
+    /// A field of the same name and type without values.
+    pub(crate) fn without_values(&self) -> Self {
+        Self { name: self.name.clone(), values: self.values.slice(0..0) }
+    }
 }
 
 /// Values of a [`Field`], stored in the file's number type to save memory.
@@ -175,6 +184,7 @@ impl PointCloud {
         self.identity = Identity::default();
         self.fields.retain(|field| field.name != name);
         self.fields.push(Field { name, values });
+        self.settle_zeros();
         Ok(self)
     }
 
@@ -182,6 +192,7 @@ impl PointCloud {
     pub fn retain_fields(&mut self, keep: impl Fn(&str) -> bool) {
         self.identity = Identity::default();
         self.fields.retain(|field| keep(&field.name));
+        self.zeros.retain(|name| keep(name));
     }
 
     /// Sets which axis points up.

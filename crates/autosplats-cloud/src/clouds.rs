@@ -56,6 +56,32 @@ pub trait Clouds: Sync + Send {
     ) -> Result<(), Error>;
 }
 
+impl<C: Clouds + ?Sized> Clouds for &C {
+    fn name(&self) -> &Path {
+        (**self).name()
+    }
+
+    fn points(&self) -> Option<u64> {
+        (**self).points()
+    }
+
+    fn outline(&self, progress: &dyn Progress) -> Result<Option<Outline>, Error> {
+        (**self).outline(progress)
+    }
+
+    fn whole(&self) -> Option<&PointCloud> {
+        (**self).whole()
+    }
+
+    fn read(
+        &self,
+        progress: &dyn Progress,
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        (**self).read(progress, take)
+    }
+}
+
 /// What the points of an input hold, known before they are read.
 #[derive(Clone, Debug)]
 pub struct Outline {
@@ -95,6 +121,36 @@ impl Clouds for Held<'_> {
         take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
     ) -> Result<(), Error> {
         take(self.cloud)
+    }
+}
+
+/// Points that are changed as they come.
+pub struct Changed<'a> {
+    /// The points before.
+    pub clouds: &'a dyn Clouds,
+    /// Changes each cloud, which keeps the number of its points.
+    pub change: Box<dyn Fn(&mut PointCloud) + Sync + Send + 'a>,
+}
+
+impl Clouds for Changed<'_> {
+    fn name(&self) -> &Path {
+        self.clouds.name()
+    }
+
+    fn points(&self) -> Option<u64> {
+        self.clouds.points()
+    }
+
+    fn read(
+        &self,
+        progress: &dyn Progress,
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        self.clouds.read(progress, &mut |cloud| {
+            let mut cloud = cloud.clone();
+            (self.change)(&mut cloud);
+            take(&cloud)
+        })
     }
 }
 

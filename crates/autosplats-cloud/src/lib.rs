@@ -52,12 +52,13 @@ mod thin;
 mod thinned;
 mod tiles;
 mod tree;
+mod zeros;
 
 pub use axes::Axes;
 pub use bytes::{Bytes, read_small};
 pub use classes::class_name;
 pub use cloud::{Field, FieldValues, PointCloud, Scan};
-pub use clouds::{Clouds, Held, Outline, add_scans};
+pub use clouds::{Changed, Clouds, Held, Outline, add_scans};
 pub use contents::Contents;
 pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use encoding::{Unmarked, read_text};

@@ -9,6 +9,7 @@ use crate::{
     Crs, Field, FieldValues, PointCloud, Scan, Unit, each_type,
     identity::Identity,
     precision::{degree_origin, residual, storage_origin},
+    zeros::{common_fields, common_zeros},
 };
 
 /// Colour of the points of a part without colours, if another part has colours.
@@ -20,8 +21,9 @@ impl PointCloud {
     /// * The origin of the result is zero if all parts lie near zero, otherwise that of the first part that does not.
     ///   Parts without poses that share one origin keep that origin and their exact positions.
     /// * If any part has colours, the points of the others become grey.
-    /// * A field is kept if every part has one of the same name; case matters. Fields of different types become `f64`.
-    ///   Normals of floats are rotated with their points and keep their lengths; other fields stay unchanged.
+    /// * A field is kept if every part [knows](Self::knows) it; it is zero where a reader left it out for being zero.
+    ///   Fields of different types become `f64`. Normals of floats are rotated with their points and keep their lengths;
+    ///   other fields stay unchanged.
     /// * Axes are kept if all parts that state axes agree. Coordinate system and resolution are kept if all parts
     ///   agree.
     /// * Scans are kept, each moved with its part.
@@ -95,8 +97,13 @@ impl PointCloud {
             colors
         });
         let first = parts[0].0;
-        let mut fields: Vec<Field> =
-            first.fields().iter().filter_map(|field| common_field(parts, &field.name)).collect();
+        let clouds = parts.iter().map(|(cloud, _)| *cloud);
+        let mut fields = common_fields(clouds.clone());
+        for Field { name, values } in &mut fields {
+            each_type!(&mut *values, v => v.reserve_exact(total));
+            let columns = clouds.clone().filter_map(|cloud| Some((cloud.column(name)?, cloud.len())));
+            columns.for_each(|(column, count)| column.append_to(values, count));
+        }
         turn_normals(&mut fields, parts);
         let agreed = |same: fn(&Self, &Self) -> bool| parts.iter().all(|(cloud, _)| same(cloud, first));
         let stated = || parts.iter().filter_map(|(cloud, _)| cloud.axes());
@@ -116,6 +123,7 @@ impl PointCloud {
             residuals: exact.then_some(residuals),
             colors,
             fields,
+            zeros: common_zeros(clouds),
             axes: stated().next().filter(|&axes| stated().all(|other| other == axes)),
             scans,
             crs: if agreed(|a, b| a.crs == b.crs) { first.crs().clone() } else { Crs::default() },
@@ -185,30 +193,4 @@ fn common_origin(parts: &[(&PointCloud, DMat4)]) -> DVec3 {
         (origin != DVec3::ZERO).then_some(if own { cloud.origin() } else { origin })
     });
     far.unwrap_or(DVec3::ZERO)
-}
-
-/// The concatenated field `name` of all parts, if every part has one.
-fn common_field(parts: &[(&PointCloud, DMat4)], name: &str) -> Option<Field> {
-    let own = |cloud: &PointCloud| cloud.fields().iter().position(|field| field.name == name);
-    let all = parts.iter().map(|(cloud, _)| Some(&cloud.fields()[own(cloud)?].values)).collect::<Option<Vec<_>>>()?;
-
-    macro_rules! join {
-        ($($variant:ident),*) => {
-            match all[0] {
-                $(FieldValues::$variant(_) => {
-                    let same = all.iter().map(|values| match values {
-                        FieldValues::$variant(values) => Some(values.as_slice()),
-                        _ => None,
-                    });
-                    same.collect::<Option<Vec<_>>>().map(|slices| FieldValues::$variant(slices.concat()))
-                })*
-            }
-        };
-    }
-    let joined = join!(U8, I8, U16, I16, U32, I32, U64, I64, F32, F64);
-    #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the types is f64 itself")]
-    let widened =
-        |values: &FieldValues| -> Vec<f64> { each_type!(values, v => v.iter().map(|&value| value as f64).collect()) };
-    let values = joined.unwrap_or_else(|| FieldValues::F64(all.iter().copied().flat_map(widened).collect()));
-    Some(Field { name: name.into(), values })
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat4, DVec3};
 
 use crate::{
-    Clouds, Error, Field, FieldValues, Part, PointCloud, Progress, Unit, each_type,
+    Clouds, Error, Field, Part, PointCloud, Progress, Unit,
     merge::GREY,
     precision::{degree_origin, residual, storage_origin},
 };
@@ -81,20 +81,15 @@ impl<'a> Merged<'a> {
         let grey = || vec![GREY; part.len()];
         shared.colors = like.colors.is_some().then(|| part.colors.clone().unwrap_or_else(grey));
         shared.scans.clone_from(&part.scans);
-        shared.fields = like.fields.iter().filter_map(|field| Some(typed(part.field(&field.name)?, field))).collect();
+        shared.fields = like.fields.iter().map(Field::without_values).collect();
+        for Field { name, values } in &mut shared.fields {
+            // Parts of an input have the fields of its first point.
+            if let Some(column) = part.column(name) {
+                column.append_to(values, part.len());
+            }
+        }
         shared
     }
-}
-
-/// A field with values of the type of another, which is `f64` if they differ.
-#[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the types is f64 itself")]
-fn typed(field: &Field, like: &Field) -> Field {
-    let values = if std::mem::discriminant(&field.values) == std::mem::discriminant(&like.values) {
-        field.values.clone()
-    } else {
-        FieldValues::F64(each_type!(&field.values, v => v.iter().map(|&value| value as f64).collect()))
-    };
-    Field { name: field.name.clone(), values }
 }
 
 /// The first point of an input.
@@ -104,9 +99,7 @@ fn head(input: &dyn Clouds, progress: &dyn Progress) -> Result<PointCloud, Error
         if part.is_empty() {
             return Ok(());
         }
-        let mut first = part.clone();
-        first.retain(|index| index == 0);
-        head = Some(first);
+        head = Some(part.pick(&[0]));
         // Ends the reading.
         Err(Error::Cancelled)
     });
@@ -139,7 +132,7 @@ impl Clouds for Merged<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Axes, Held, Scan};
+    use crate::{Axes, FieldValues, Held, Scan};
 
     /// Clouds that come in parts of three points.
     struct Threes(PointCloud);

@@ -1,5 +1,7 @@
 //! Some points of a cloud: copied to a cloud of their own, or moved within the cloud.
 
+use std::ops::Range;
+
 use glam::{DMat4, DVec3};
 use rayon::prelude::*;
 
@@ -25,11 +27,28 @@ impl PointCloud {
             residuals: self.residuals.as_ref().map(|residuals| gather(residuals, points)),
             colors: self.colors.as_ref().map(|colors| gather(colors, points)),
             fields: self.fields.iter().map(field).collect(),
+            zeros: self.zeros.clone(),
             axes: self.axes,
             scans: scans.collect(),
             crs: self.crs.clone(),
             resolution: self.resolution,
             identity: Identity::default(),
+        }
+    }
+
+    /// Copies points that follow each other, with all attributes but the scans, to a new cloud.
+    ///
+    /// # Panics
+    /// If the range reaches beyond the cloud's points.
+    #[must_use]
+    pub fn slice(&self, points: Range<usize>) -> Self {
+        let field = |Field { name, values }: &Field| Field { name: name.clone(), values: values.slice(points.clone()) };
+        Self {
+            positions: self.positions[points.clone()].to_vec(),
+            residuals: self.residuals.as_ref().map(|residuals| residuals[points.clone()].to_vec()),
+            colors: self.colors.as_ref().map(|colors| colors[points.clone()].to_vec()),
+            fields: self.fields.iter().map(field).collect(),
+            ..self.clone_without_points()
         }
     }
 
@@ -75,6 +94,16 @@ impl PointCloud {
 }
 
 impl FieldValues {
+    /// Values that follow each other.
+    pub(crate) fn slice(&self, points: Range<usize>) -> Self {
+        macro_rules! each {
+            ($($variant:ident),*) => {
+                match self { $(Self::$variant(values) => Self::$variant(values[points].to_vec()),)* }
+            };
+        }
+        each!(U8, I8, U16, I16, U32, I32, U64, I64, F32, F64)
+    }
+
     /// The values with the given indices.
     fn pick(&self, points: &[u32]) -> Self {
         macro_rules! each {

@@ -74,6 +74,7 @@ impl PointCloud {
             residuals: self.residuals.as_ref().map(|residuals| residuals.iter().map(scaled).collect()),
             colors: self.colors.clone(),
             fields: self.fields.clone(),
+            zeros: self.zeros.clone(),
             axes: self.axes,
             scans: self.scans.iter().map(scan).collect(),
             crs: self.crs.clone(),

@@ -6,7 +6,7 @@ use std::{
 };
 
 use crate::{
-    Clouds, Crs, Error, Field, FieldValues, PointCloud, Progress, Scan, each_type,
+    Clouds, Crs, Error, Field, PointCloud, Progress, Scan, each_type,
     files::{read_exact_at, temporary_unnamed, write_all_at},
 };
 
@@ -77,7 +77,7 @@ impl Spool {
                 residuals: None,
                 colors: None,
                 scans: Vec::new(),
-                fields: cloud.fields.iter().map(empty).collect(),
+                fields: cloud.fields.iter().map(Field::without_values).collect(),
                 ..cloud.clone_without_points()
             };
         }
@@ -135,7 +135,7 @@ impl Spool {
         let residuals = if stored.residuals { Some(triples(&mut at)?) } else { None };
         let mut colors = stored.colors.then(|| vec![[0_u8; 3]; len]);
         colors.iter_mut().try_for_each(|colors| self.get(&mut at, bytemuck::cast_slice_mut(colors)))?;
-        let mut fields: Vec<Field> = self.like.fields.iter().map(empty).collect();
+        let mut fields: Vec<Field> = self.like.fields.iter().map(Field::without_values).collect();
         for field in &mut fields {
             each_type!(&mut field.values, v => {
                 v.resize(len, Default::default());
@@ -147,23 +147,12 @@ impl Spool {
     }
 }
 
-/// A field of the same name and type without values.
-fn empty(field: &Field) -> Field {
-    macro_rules! of_type {
-        ($($variant:ident),*) => {
-            match field.values {
-                $(FieldValues::$variant(_) => FieldValues::$variant(Vec::new()),)*
-            }
-        };
-    }
-    Field { name: field.name.clone(), values: of_type!(U8, I8, U16, I16, U32, I32, U64, I64, F32, F64) }
-}
-
 impl PointCloud {
     /// All that is not a value per point.
     pub(crate) fn clone_without_points(&self) -> Self {
         Self {
             origin: self.origin,
+            zeros: self.zeros.clone(),
             axes: self.axes,
             crs: self.crs.clone(),
             resolution: self.resolution,
@@ -201,7 +190,7 @@ mod tests {
     use glam::{DMat4, DVec3};
 
     use super::*;
-    use crate::{Axes, Held};
+    use crate::{Axes, FieldValues, Held};
 
     struct Two(PointCloud, PointCloud);
 

@@ -10,7 +10,7 @@ use crate::args::{ConvertArgs, ThinningArgs};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
-use crate::output::{check_cloud_target, forced, write_cloud};
+use crate::output::{check_cloud_target, forced, is_tree, write_cloud};
 use crate::parts::{Need, Parts, check_room, parts, points_in};
 use crate::progress::Bar;
 
@@ -27,7 +27,7 @@ pub(crate) fn run(args: &ConvertArgs, console: &Console) -> Result<(), Failure> 
     let output = forced(&output, *force);
     check_cloud_target(output, &inputs.files([]))?;
     check_room(&args.room)?;
-    if tree::is_tree(output.path) {
+    if is_tree(output.path) {
         return tree::run(args, &inputs, output, console);
     }
     let need = Need { what: "the work", memory: BYTES_PER_POINT, disk: thinning.voxel.map_or(0, |_| VOXEL_BYTES) };

@@ -1,7 +1,5 @@
 //! Writing one octree of all inputs, in bounded memory.
 
-use std::path::Path;
-
 use autosplats_cloud::{Output, usual_memory};
 use autosplats_formats::{TreeOptions, write_tree};
 
@@ -9,17 +7,9 @@ use crate::args::ConvertArgs;
 use crate::console::Console;
 use crate::exit::Failure;
 use crate::input::Inputs;
-use crate::output::folder_of;
+use crate::output::{TREE_ENDING, folder_of};
 use crate::parts::failure;
 use crate::progress::Bar;
-
-/// What the names of octrees end in.
-const ENDING: &str = ".copc.laz";
-
-/// Whether the name is that of an octree.
-pub(super) fn is_tree(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().to_ascii_lowercase().ends_with(ENDING))
-}
 
 /// Fails for options that need all points in memory at once.
 fn check(args: &ConvertArgs) -> Result<(), Failure> {
@@ -33,7 +23,7 @@ fn check(args: &ConvertArgs) -> Result<(), Failure> {
     ];
     match refused.into_iter().find(|(_, is_given)| *is_given) {
         Some((option, _)) => Err(Failure::usage(format!(
-            "{option}: points go straight into an octree; convert to a plain .laz with {option} first, and that to {ENDING}"
+            "{option}: points go straight into an octree; convert to a plain .laz with {option} first, and that to {TREE_ENDING}"
         ))),
         None => Ok(()),
     }

@@ -140,6 +140,7 @@ fn more_points_than_memory_holds_are_converted_in_parts() {
         ("a.laz", &["--voxel", "0.02", "--noise", "0.001"]),
         ("a.xyz", &box_of_some),
         ("a.pcd", &["--noise", "0.01", "--seed", "7"]),
+        ("a.e57", &["--every", "2"]),
     ] {
         let whole = ["convert", "scan.laz", output, "--force"];
         folder.succeed(&[&whole[..], options].concat());
@@ -151,12 +152,9 @@ fn more_points_than_memory_holds_are_converted_in_parts() {
     }
     let nothing = ["convert", "scan.laz", "b.ply", "--memory", "5M", "--bounds", "9,9,9,10,10,10"];
     folder.fail(&nothing, 3, &["none of the 100000 points", "--bounds"]);
-    let outcome = folder.succeed(&["convert", "scan.laz", "b.e57", "--memory", "5M"]);
-    assert!(outcome.stderr.contains("note: --memory: E57"), "{}", outcome.stderr);
     folder.fail(&["convert", "scan.laz", "b.ply", "--memory", "5M", "--temp", "nowhere"], 4, &["nowhere"]);
     folder.write("pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n");
-    let outcome =
-        folder.succeed(&["convert", "scan.laz", "b.ply", "--force", "--memory", "5M", "--pose", "scan.laz=pose.txt"]);
+    let outcome = folder.succeed(&["convert", "scan.laz", "b.ply", "--memory", "5M", "--pose", "scan.laz=pose.txt"]);
     assert!(!outcome.stderr.contains("note: --memory"), "a pose that moves nothing: {}", outcome.stderr);
     folder.write("pose.txt", "1 0 0 1\n0 1 0 0\n0 0 1 0\n");
     let outcome =
@@ -185,4 +183,42 @@ fn several_inputs_of_more_points_than_memory_holds_are_joined_in_parts() {
     }
     folder.write("empty.xyz", "");
     folder.fail(&["convert", "a.laz", "empty.xyz", "-o", "b.las", "--memory", "5M"], 3, &["empty.xyz"]);
+}
+
+/// Of a tile whose class is 0 everywhere nothing is lost, but a PLY without classes has none.
+#[test]
+fn tiles_with_fields_of_zeros_are_joined() {
+    let folder = Folder::new();
+    let tile = |name: &str, class: u8| {
+        let rows: String = (0..400).map(|i| format!("{i} {} 1 {class} {}\n", i % 7, i % 3)).collect();
+        folder.write("tile.csv", &format!("x y z Classification ReturnNumber\n{rows}"));
+        folder.succeed(&["convert", "tile.csv", name]);
+    };
+    tile("ground.laz", 2);
+    tile("new.laz", 0);
+    folder.write("bare.xyz", "1 2 3\n4 5 6\n7 8 9\n");
+    for inputs in [["ground.laz", "new.laz"], ["new.laz", "ground.laz"]] {
+        for output in ["all.laz", "all.ply", "all.copc.laz"] {
+            let words = [&["convert"], &inputs[..], &["-o", output, "--force"]].concat();
+            let outcome = folder.succeed(&words);
+            assert!(!outcome.stderr.contains("left out"), "{inputs:?}: {}", outcome.stderr);
+            let info = folder.succeed(&["info", output, "--scan", "--json"]).stdout;
+            let info: serde_json::Value = serde_json::from_str(&info).expect("JSON");
+            let attributes = info["attributes"].as_array().expect("a list");
+            let class = attributes.iter().find(|one| one["name"] == "Classification").expect("classes");
+            assert_eq!((&class["min"], &class["max"]), (&0.0.into(), &2.0.into()), "{output}");
+            if output != "all.copc.laz" {
+                let whole = folder.read(output);
+                let outcome = folder.succeed(&[&words[..], &["--memory", "50K"]].concat());
+                assert!(folder.read(output) == whole, "in parts: {}", outcome.stderr);
+                assert!(!outcome.stderr.contains("left out"), "{inputs:?}: {}", outcome.stderr);
+            }
+        }
+    }
+    for memory in [&[][..], &["--memory", "50K"]] {
+        let words = ["convert", "ground.laz", "bare.xyz", "-o", "all.laz", "--force"];
+        let outcome = folder.succeed(&[&words[..], memory].concat());
+        let told = "ground.laz: not all inputs have ReturnNumber, Classification; left out";
+        assert!(outcome.stderr.contains(told), "{}", outcome.stderr);
+    }
 }

@@ -94,4 +94,8 @@ fn more_points_than_memory_holds_have_the_same_normals() {
         let unlike = whole.iter().zip(&parts).filter(|pair| !same(*pair)).count();
         assert!(unlike <= whole.len() / 10_000, "{options:?}: {unlike} of {} differ", whole.len());
     }
+    let outcome = folder.succeed(&["normals", "scan.laz", "n.copc.laz", "--memory", "4M"]);
+    assert!(outcome.stderr.contains("normals of 100000 points"), "{}", outcome.stderr);
+    let info = folder.succeed(&["info", "n.copc.laz"]).stdout;
+    assert!(info.contains("COPC") && info.contains("NormalZ"), "an octree of the results: {info}");
 }

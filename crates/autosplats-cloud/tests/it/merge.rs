@@ -1,8 +1,10 @@
 //! Tests of merging several clouds.
 
+use std::path::Path;
+
 use crate::common::{colors, positions, rich_cloud};
 use autosplats_cloud::{
-    Axes, FieldValues, PointCloud,
+    Axes, Clouds, Error, FieldValues, Merged, PointCloud, Progress,
     glam::{DMat4, DVec3},
 };
 
@@ -56,4 +58,62 @@ fn attributes_of_unlike_parts() {
     assert_eq!(values(&merge(&bytes, &bytes)), FieldValues::U8(vec![1, 2, 1, 2]), "one width");
     assert_eq!(values(&merge(&bytes, &floats)), FieldValues::F64(vec![1.0, 2.0, 0.5, 3.0]), "two widths");
     assert!(merge(&bytes, &bare).fields().is_empty(), "a field that one part lacks is dropped");
+}
+
+/// A cloud that comes in parts of two points.
+struct Twos(PointCloud);
+
+impl Clouds for Twos {
+    fn name(&self) -> &Path {
+        Path::new("twos")
+    }
+
+    fn read(
+        &self,
+        _progress: &dyn Progress,
+        take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let len = self.0.len();
+        (0..len).step_by(2).try_for_each(|start| take(&self.0.slice(start..len.min(start + 2))))
+    }
+}
+
+#[test]
+fn what_is_zero_is_not_unknown() {
+    let bare = PointCloud::new(DVec3::ZERO, positions(3));
+    let zero = bare.clone().with_zeros(["Classification", "UserData"]);
+    let bytes = FieldValues::U8(vec![6, 0, 7]);
+    let class = bare.clone().with_field("Classification", bytes.clone()).unwrap().with_zeros(["UserData"]);
+    let wide = bare.clone().with_field("Classification", FieldValues::I32(vec![-1; 3])).unwrap();
+    let merged = |clouds: &[&PointCloud]| {
+        let merged = PointCloud::merge(clouds.iter().map(|&cloud| (cloud.clone(), DMat4::IDENTITY)).collect());
+        let inputs = clouds.iter().map(|&cloud| Box::new(Twos(cloud.clone())) as Box<dyn Clouds>).collect();
+        let mut parts = PointCloud::default();
+        let add = &mut |part: &PointCloud| {
+            parts.append(part.clone());
+            Ok(())
+        };
+        Merged::new("all".into(), inputs, &()).unwrap().read(&(), add).unwrap();
+        assert_eq!(parts, merged, "in parts");
+        merged
+    };
+    let only = |cloud: PointCloud| {
+        assert_eq!(cloud.fields().len(), 1);
+        cloud.fields()[0].values.clone()
+    };
+    let values = FieldValues::U8([6, 0, 7, 0, 0, 0].into());
+    assert_eq!(only(merged(&[&class, &zero])), values, "zeros behind");
+    let values = FieldValues::U8([0, 0, 0, 6, 0, 7].into());
+    assert_eq!(only(merged(&[&zero, &class])), values, "and before");
+    let values = FieldValues::I32([-1, -1, -1, 0, 0, 0].into());
+    assert_eq!(only(merged(&[&wide, &zero])), values, "zeros are of any type");
+    let values = FieldValues::F64([-1.0, -1.0, -1.0, 6.0, 0.0, 7.0, 0.0, 0.0, 0.0].into());
+    assert_eq!(only(merged(&[&wide, &class, &zero])), values, "other values are not");
+    assert!(merged(&[&class, &bare]).fields().is_empty(), "nothing is known of one part");
+    // What is zero everywhere stays known.
+    let three = merged(&[&zero, &class]);
+    let user = bare.with_field("UserData", bytes).unwrap().with_zeros(["Classification"]);
+    assert!(three.knows("UserData") && !merged(&[&class, &wide]).knows("UserData"));
+    assert_eq!(merged(&[&three, &user]).fields().len(), 2, "in a second round too");
+    assert!(!user.clone().with_field("Classification", FieldValues::U8(vec![1; 3])).unwrap().knows("userdata"), "case");
 }

@@ -18,11 +18,6 @@ pub(super) fn channels(cloud: &PointCloud) -> Option<[&FieldValues; 3]> {
     three.iter().all(|values| discriminant(*values) == discriminant(three[0])).then_some(three)
 }
 
-/// The [`channels`], if they are the cloud's [colours](WideColors::are_colors).
-pub(super) fn wide_colors(cloud: &PointCloud) -> Option<[&FieldValues; 3]> {
-    WideColors::of(cloud).filter(WideColors::are_colors).and_then(|_| channels(cloud))
-}
-
 /// What is known of the [`channels`] of clouds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WideColors {

@@ -2,7 +2,7 @@
 
 use std::mem::{Discriminant, discriminant};
 
-use autosplats_cloud::{Axes, Crs, Error, FieldValues, PointCloud};
+use autosplats_cloud::{Crs, Error, FieldValues, PointCloud};
 use glam::{DMat4, DVec3};
 use rayon::prelude::*;
 
@@ -13,6 +13,8 @@ const MAX_EXACT_INTEGER: u64 = 1 << 53;
 
 /// Facts about all clouds of a job, which have the same fields.
 pub(super) struct Facts {
+    /// A cloud without points, with the fields and the coordinate system of all.
+    pub(super) like: PointCloud,
     pub(super) points: u64,
     /// Whether positions have an origin other than zero, and whether they have residuals.
     pub(super) origin: bool,
@@ -25,9 +27,6 @@ pub(super) struct Facts {
     pub(super) scans: bool,
     /// The pose of the sensor, if one sensor saw all points.
     pub(super) only_pose: Option<DMat4>,
-    /// Whether there is a coordinate system.
-    pub(super) system: bool,
-    pub(super) axes: Option<Axes>,
 }
 
 impl Facts {
@@ -53,6 +52,7 @@ impl Facts {
         };
         let fields = cloud.fields();
         Self {
+            like: cloud.slice(0..0),
             points: cloud.len() as u64,
             origin: cloud.origin() != DVec3::ZERO,
             residuals: cloud.residuals().is_some(),
@@ -65,8 +65,6 @@ impl Facts {
                 [scan] if scan.points == (0..cloud.len()) => Some(scan.world_from_sensor),
                 _ => None,
             },
-            system: *cloud.crs() != Crs::default(),
-            axes: cloud.axes(),
         }
     }
 
@@ -86,6 +84,16 @@ impl Facts {
         Ok(())
     }
 
+    /// Whether there is a coordinate system.
+    pub(super) fn has_system(&self) -> bool {
+        *self.like.crs() != Crs::default()
+    }
+
+    /// Whether the fields `Red`, `Green` and `Blue` are 16-bit integers.
+    pub(super) fn are_short(&self) -> bool {
+        self.wide.is_some_and(|wide| wide.are_short())
+    }
+
     /// Whether the fields `Red`, `Green` and `Blue` are the colours, with more digits.
     pub(super) fn are_wide(&self) -> bool {
         self.wide.is_some_and(|wide| wide.are_colors())
@@ -94,7 +102,7 @@ impl Facts {
 
 /// Notes that `format` cannot hold the sensors, the coordinate system and `others`, as far as the points have them.
 pub(super) fn note_left_out(job: &Job<'_>, facts: &Facts, format: &str, others: &[(bool, &str)]) {
-    let all = [(facts.scans, "the poses of the sensors"), (facts.system, "the coordinate system")];
+    let all = [(facts.scans, "the poses of the sensors"), (facts.has_system(), "the coordinate system")];
     let losses: Vec<&str> = all.iter().chain(others).filter(|(lost, _)| *lost).map(|(_, what)| *what).collect();
     if !losses.is_empty() {
         job.note(format!("{format} does not hold {}", losses.join(", ")));

@@ -54,12 +54,4 @@ impl Job<'_> {
         })?;
         if none { take(&PointCloud::default()) } else { Ok(()) }
     }
-
-    /// The points in one cloud, for formats that need all at once.
-    pub(super) fn whole(&self, format: &str) -> Result<&PointCloud, Error> {
-        self.clouds.whole().ok_or_else(|| {
-            let what = format!("{format} is written from memory, which does not hold all points; write .laz or .ply");
-            Error::unsupported(self.path, what)
-        })
-    }
 }

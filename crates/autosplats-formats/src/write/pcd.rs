@@ -34,7 +34,7 @@ fn note_losses(job: &Job<'_>, facts: &Facts) {
     } else if facts.residuals {
         job.note("coordinates are rounded to 32-bit floats, which is what programs read from PCD");
     }
-    if facts.system {
+    if facts.has_system() {
         job.note("PCD does not hold the coordinate system");
     }
     if facts.scans && facts.only_pose.is_none() {
@@ -78,7 +78,7 @@ impl Layout {
             };
             fields.push((name, kind, size));
         }
-        let axes = facts.axes.map_or_else(String::new, |axes| format!("# axes {}\n", axes.name()));
+        let axes = facts.like.axes().map_or_else(String::new, |axes| format!("# axes {}\n", axes.name()));
         // The default viewpoint may mean a sensor at the origin or none.
         let sensor = if facts.only_pose.is_some() { "# sensor at VIEWPOINT\n" } else { "" };
         let words =

@@ -64,7 +64,7 @@ impl<'a> Layout<'a> {
 
     fn header(&self, facts: &Facts) -> String {
         let mut header = String::from("ply\nformat binary_little_endian 1.0\n");
-        header += &facts.axes.map_or_else(String::new, |axes| format!("comment axes {}\n", axes.name()));
+        header += &facts.like.axes().map_or_else(String::new, |axes| format!("comment axes {}\n", axes.name()));
         header += &format!("element vertex {}\n", facts.points);
         for axis in ["x", "y", "z"] {
             header += &format!("property {} {axis}\n", if self.doubles { "double" } else { "float" });

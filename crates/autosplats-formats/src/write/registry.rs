@@ -47,12 +47,11 @@ pub fn write<'a>(cloud: &PointCloud, output: impl Into<Output<'a>>, progress: &d
     write_clouds(&Held { name: output.path, cloud }, output, progress)
 }
 
-/// Like [`write()`], of points that come in parts. They are read two or three times, and memory needs to hold only a
+/// Like [`write()`], of points that come in parts. They are read two to six times, and memory needs to hold only a
 /// part of them. The file has the same bytes as if all came at once.
 ///
 /// # Errors
-/// Those of [`write()`] and of reading; [`Error::Unsupported`] for parts of unlike fields, and for formats that are
-/// written from memory (E57).
+/// Those of [`write()`] and of reading; [`Error::Unsupported`] for parts of unlike fields.
 ///
 /// # Examples
 ///

@@ -55,7 +55,7 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
             if is_pts {
                 note_lost_fields(job, cloud);
             }
-            note_left_out(job, &facts, "text", &[(facts.axes.is_some(), "which axis is up")]);
+            note_left_out(job, &facts, "text", &[(facts.like.axes().is_some(), "which axis is up")]);
             file.write_all(header.as_bytes()).map_err(io)?;
         }
         for start in (0..cloud.len()).step_by(PIECE * BATCH) {

@@ -31,3 +31,4 @@ mod sensors;
 mod text;
 mod tree_parts;
 mod units;
+mod written_in_parts;

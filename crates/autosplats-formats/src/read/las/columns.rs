@@ -285,8 +285,16 @@ impl<'a> Columns<'a> {
         names
     }
 
-    /// Makes the cloud; a field that is zero at every point was not recorded and is left out. The second result tells
-    /// that the 16-bit colours are read as 8 bits.
+    /// Names of the values that are zero at every point.
+    fn zeros(&self) -> Vec<String> {
+        let is_zero = |(index, dimension): &(usize, &Dimension)| {
+            !matches!(dimension.source, Source::Color(_)) && !self.is_recorded(*index)
+        };
+        self.dimensions.iter().enumerate().filter(is_zero).map(|(_, dimension)| dimension.name.clone()).collect()
+    }
+
+    /// Makes the cloud; of a field that is zero at every point only the name is kept. The second result tells that the
+    /// 16-bit colours are read as 8 bits.
     pub(super) fn into_cloud(mut self) -> Result<(PointCloud, Option<String>), Error> {
         self.settle_colors();
         let told = self.seen.narrow_note();
@@ -313,7 +321,8 @@ impl<'a> Columns<'a> {
 
     fn finish(self) -> Result<PointCloud, Error> {
         let mut names = self.names().into_iter().peekable();
-        let mut cloud = PointCloud::new(self.origin, self.positions).with_axes(Axes::ZUp);
+        let zeros = self.zeros();
+        let mut cloud = PointCloud::new(self.origin, self.positions).with_axes(Axes::ZUp).with_zeros(zeros);
         if self.seen.residuals {
             cloud = cloud.with_residuals(self.residuals)?;
         }

@@ -41,7 +41,7 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Error, Held, Output, Part as PartOf, PointFilter, Progress, Spill, check_disk, lock, usual_memory, write_whole,
+    Error, Output, Part as PartOf, PointFilter, Progress, Spill, check_disk, lock, usual_memory, write_whole,
 };
 use glam::DVec3;
 use rayon::prelude::*;
@@ -177,9 +177,8 @@ pub(super) const FORMAT: Format = Format {
     name: "COPC",
     extensions: &["copc.laz"],
     write: |job, file| {
-        let held = Held { name: job.path, cloud: job.whole("COPC")? };
         let options = TreeOptions { memory: usual_memory(), ..TreeOptions::default() };
-        make(vec![TreeInput::Clouds(Box::new(held))], job.path, &options, job.progress, file).map(drop)
+        make(vec![TreeInput::Clouds(Box::new(job.clouds))], job.path, &options, job.progress, file).map(drop)
     },
 };
 

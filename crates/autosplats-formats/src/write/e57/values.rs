@@ -1,9 +1,14 @@
 //! The values of a point, each in its own stream.
 
+use std::ops::Range;
+
 use autosplats_cloud::{Field, FieldValues, PointCloud};
 use glam::{DMat3, DVec3};
 
-use super::{super::colors::wide_colors, Job};
+use super::{
+    super::colors::channels,
+    facts::{CloudFacts, is_finite},
+};
 
 /// One value of each point: name and source.
 pub(super) struct Value<'a> {
@@ -95,11 +100,11 @@ impl Source<'_> {
     }
 
     /// Appends the values of some points.
-    pub(super) fn encode(self, cloud: &PointCloud, frame: Frame, points: &[usize], out: &mut Vec<u8>) {
-        let valid = |i: usize| cloud.positions()[i].iter().all(|value| value.is_finite());
+    pub(super) fn encode(self, cloud: &PointCloud, frame: Frame, points: Range<usize>, out: &mut Vec<u8>) {
+        let valid = |i: usize| is_finite(&cloud.positions()[i]);
         match self {
             Self::Position { axis, single } => {
-                for &i in points {
+                for i in points {
                     let local = if valid(i) { frame.local(cloud.world_position(i)) } else { DVec3::ZERO };
                     if single {
                         out.extend((local[axis] as f32).to_le_bytes());
@@ -109,19 +114,19 @@ impl Source<'_> {
                 }
             }
             Self::State => {
-                out.extend(points.chunks(4).map(|four| {
-                    let bits = |(place, &i): (usize, &usize)| if valid(i) { 0 } else { 2_u8 << (2 * place) };
-                    four.iter().enumerate().map(bits).sum::<u8>()
+                out.extend(points.clone().step_by(4).map(|first| {
+                    let bits = |(place, i): (usize, usize)| if valid(i) { 0 } else { 2_u8 << (2 * place) };
+                    (first..points.end.min(first + 4)).enumerate().map(bits).sum::<u8>()
                 }));
             }
             Self::Color(channel) => {
                 if let Some(colors) = cloud.colors() {
-                    out.extend(points.iter().map(|&i| colors[i][channel]));
+                    out.extend(colors[points].iter().map(|color| color[channel]));
                 }
             }
-            Self::Double(values) => points.iter().for_each(|&i| out.extend(values.get(i).to_le_bytes())),
+            Self::Double(values) => points.for_each(|i| out.extend(values.get(i).to_le_bytes())),
             Self::Normal { fields, axis, single } => {
-                for &i in points {
+                for i in points {
                     if single {
                         out.extend((fields[axis].get(i) as f32).to_le_bytes());
                     } else {
@@ -138,11 +143,11 @@ impl Source<'_> {
 }
 
 /// Appends values minus `less`. Integers are stored as the distance from the least value of their type.
-fn put(values: &FieldValues, points: &[usize], less: u8, out: &mut Vec<u8>) {
+fn put(values: &FieldValues, points: Range<usize>, less: u8, out: &mut Vec<u8>) {
     macro_rules! put {
         ($v:expr, $min:expr, $less:expr) => {
-            for &i in points {
-                out.extend($v[i].wrapping_sub($less).wrapping_sub($min).to_le_bytes());
+            for value in &$v[points] {
+                out.extend(value.wrapping_sub($less).wrapping_sub($min).to_le_bytes());
             }
         };
     }
@@ -156,45 +161,24 @@ fn put(values: &FieldValues, points: &[usize], less: u8, out: &mut Vec<u8>) {
         // The stored minimum is that of a signed integer, half the range below zero.
         FieldValues::U64(v) => put!(v, 1 << 63, u64::from(less)),
         FieldValues::I64(v) => put!(v, i64::MIN, i64::from(less)),
-        FieldValues::F32(v) => points.iter().for_each(|&i| out.extend(v[i].to_le_bytes())),
-        FieldValues::F64(v) => points.iter().for_each(|&i| out.extend(v[i].to_le_bytes())),
-    }
-}
-
-/// Facts that take a pass over all points, computed once for all scans.
-pub(super) struct CloudFacts<'a> {
-    /// Colours of 16 bits.
-    pub(super) wide_colors: Option<[&'a FieldValues; 3]>,
-    /// Whether [returns] are counted from 1.
-    counted: bool,
-    /// Names of fields with integers [beyond] 63 bits.
-    pub(super) beyond: Vec<&'a str>,
-}
-
-impl<'a> CloudFacts<'a> {
-    pub(super) fn of(cloud: &'a PointCloud) -> Self {
-        Self {
-            wide_colors: wide_colors(cloud).filter(|[red, ..]| matches!(red, FieldValues::U16(_))),
-            counted: returns(cloud),
-            beyond: cloud.fields().iter().filter(|field| beyond(&field.values)).map(|field| &*field.name).collect(),
-        }
-    }
-
-    /// A field unchanged, or as floats if E57 cannot hold its integers.
-    fn source(&self, field: &'a Field) -> Source<'a> {
-        if self.beyond.contains(&&*field.name) { Source::Double(&field.values) } else { Source::Field(&field.values) }
+        FieldValues::F32(v) => v[points].iter().for_each(|value| out.extend(value.to_le_bytes())),
+        FieldValues::F64(v) => v[points].iter().for_each(|value| out.extend(value.to_le_bytes())),
     }
 }
 
 /// All values of a cloud's points: positions in 32 bits if `single`, with a `state` if some points have no position.
 pub(super) fn values<'a>(
-    job: &Job<'a>,
-    known: &CloudFacts<'a>,
+    cloud: &'a PointCloud,
+    known: &CloudFacts,
     frame: Frame,
     single: bool,
     state: bool,
 ) -> Vec<Value<'a>> {
-    let cloud = job.cloud;
+    // A field unchanged, or as floats if E57 cannot hold its integers.
+    let source = |field: &'a Field| {
+        let values = &field.values;
+        if known.beyond.contains(&field.name) { Source::Double(values) } else { Source::Field(values) }
+    };
     let mut all = Vec::new();
     let mut add = |name: &str, source| all.push(Value { name: name.into(), source });
     for (axis, name) in ["cartesianX", "cartesianY", "cartesianZ"].into_iter().enumerate() {
@@ -207,7 +191,7 @@ pub(super) fn values<'a>(
         let found = names.map(|name| named(cloud, name));
         Some([found[0]?, found[1]?, found[2]?])
     };
-    let wide = known.wide_colors;
+    let wide = channels(cloud).filter(|_| known.wide);
     for (channel, name) in ["colorRed", "colorGreen", "colorBlue"].into_iter().enumerate() {
         match wide {
             Some(wide) => add(name, Source::Field(wide[channel])),
@@ -222,12 +206,12 @@ pub(super) fn values<'a>(
         let integers = !matches!(values, FieldValues::F32(_) | FieldValues::F64(_));
         match &**name {
             "Red" | "Green" | "Blue" if wide.is_some() => {}
-            "Intensity" => add("intensity", known.source(one)),
+            "Intensity" => add("intensity", source(one)),
             "ReturnNumber" if known.counted => add("returnIndex", Source::FromZero(values)),
-            "NumberOfReturns" if known.counted => add("returnCount", known.source(one)),
+            "NumberOfReturns" if known.counted => add("returnCount", source(one)),
             "GpsTime" => add("timeStamp", Source::Double(values)),
             "rowIndex" | "columnIndex" | "isIntensityInvalid" | "isColorInvalid" if integers => {
-                add(name, known.source(one));
+                add(name, source(one));
             }
             "NormalX" | "NormalY" | "NormalZ" if normals.is_some() => {
                 if let Some((axis, fields)) =
@@ -243,7 +227,7 @@ pub(super) fn values<'a>(
                 while names.contains(&fit) {
                     fit.push('_');
                 }
-                add(&format!("autosplats:{fit}"), known.source(one));
+                add(&format!("autosplats:{fit}"), source(one));
                 names.push(fit);
             }
         }
@@ -252,7 +236,7 @@ pub(super) fn values<'a>(
 }
 
 /// Whether some integers exceed 63 bits.
-fn beyond(values: &FieldValues) -> bool {
+pub(super) fn beyond(values: &FieldValues) -> bool {
     matches!(values, FieldValues::U64(values) if values.iter().any(|&value| i64::try_from(value).is_err()))
 }
 
@@ -261,7 +245,7 @@ fn named<'a>(cloud: &'a PointCloud, name: &str) -> Option<&'a FieldValues> {
 }
 
 /// Whether returns are counted from 1, as they should be, so that E57's own elements can hold them.
-fn returns(cloud: &PointCloud) -> bool {
+pub(super) fn returns(cloud: &PointCloud) -> bool {
     let whole = |values: &&FieldValues| !matches!(values, FieldValues::F32(_) | FieldValues::F64(_)) && !beyond(values);
     let number = named(cloud, "ReturnNumber").filter(whole);
     let counts = named(cloud, "NumberOfReturns").filter(whole);
