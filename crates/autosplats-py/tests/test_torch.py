@@ -45,8 +45,9 @@ def test_tensors_elsewhere_are_refused(points):
             return (2, 0)
 
     there = torch.from_numpy(points).as_subclass(OnACard)
-    with pytest.raises(TypeError, match=r"points: .*graphics card; copy them first, as tensor\.cpu\(\)"):
-        autosplats.estimate_normals(there)
+    for given in (there, there.clone().requires_grad_()):
+        with pytest.raises(TypeError, match=r"points: .*graphics card; copy them first, as tensor\.cpu\(\)"):
+            autosplats.estimate_normals(given)
     with pytest.raises(TypeError, match=r"colors: .*graphics card"):
         autosplats.render(points, there)
     for kind in (torch.rand(5, 3, device="meta"), torch.rand(5, 3).to_sparse()):

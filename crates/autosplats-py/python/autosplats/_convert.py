@@ -79,14 +79,14 @@ def held(points: object, name: str = "points") -> Held:
 def array(values: object, name: str) -> Array:
     """An array of what numpy takes, a view where it can be. Arrays of other devices are refused: copying them is the
     caller's choice."""
+    if getattr(values, "requires_grad", False) and hasattr(values, "detach"):
+        values = values.detach()
     if _is_elsewhere(values):
         kind = f"{type(values).__module__.partition('.')[0]}.{type(values).__name__}"
         raise TypeError(
             f"{name}: the values of this {kind} are in the memory of a graphics card; copy them first, "
             "as tensor.cpu() or cupy.asnumpy(array) do"
         )
-    if getattr(values, "requires_grad", False) and hasattr(values, "detach"):
-        values = values.detach()
     if type(values).__module__.startswith("numpy.ma"):
         # Masked points have no position. Asking numpy.ma itself would import it, also in a process that was forked
         # while another thread was doing so, which waits for ever.
@@ -101,13 +101,11 @@ def _is_elsewhere(values: object) -> bool:
     """Whether the values are in memory that the processor does not read."""
     if isinstance(values, np.ndarray):
         return False
-    if hasattr(values, "__cuda_array_interface__"):
-        return True
-    device = getattr(values, "__dlpack_device__", None)
-    if not callable(device):
-        return False
     try:
-        return int(device()[0]) not in _CPU_DEVICES
+        if hasattr(values, "__cuda_array_interface__"):
+            return True
+        device = getattr(values, "__dlpack_device__", None)
+        return callable(device) and int(device()[0]) not in _CPU_DEVICES
     except (ValueError, TypeError, RuntimeError, BufferError):
         # Tensors without memory have no device; why they are no array is what numpy is told.
         return False
