@@ -46,6 +46,8 @@ pub(crate) fn pool(threads: Option<usize>) -> PyResult<&'static ThreadPool> {
         }
         at = node.before.cast_mut();
     }
+    // Found once, behind a lock, which another thread's fork must not find locked: here the interpreter is held.
+    autosplats_cloud::available_memory();
     let built = ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|number| format!("autosplats-{number}"))

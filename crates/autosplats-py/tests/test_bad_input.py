@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import sys
 import threading
 
 import numpy as np
@@ -9,6 +12,8 @@ import pytest
 
 import autosplats
 from autosplats import ArgumentError, Cloud, EmptyError, FormatError, MissingFieldError, OutOfMemoryError
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="Linux only")
 
 
 @pytest.mark.parametrize(
@@ -139,15 +144,71 @@ def test_pictures_larger_than_memory():
         autosplats.render(np.random.rand(50, 3), size=(16_384, 16_384), supersample=16)
 
 
+@linux
+def test_no_memory(python):
+    done = python(
+        """
+        import resource, numpy as np, autosplats
+        points = np.random.default_rng(0).random((3_000_000, 3), dtype=np.float32)
+        cloud = autosplats.Cloud(points)
+        def threads_start():
+            autosplats.estimate_normals(points[:1000])
+        threads_start()
+        taken = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (taken + (30 << 20), resource.RLIM_INFINITY))
+        for call in (
+            lambda: autosplats.Cloud(points),
+            lambda: autosplats.estimate_normals(cloud),
+            lambda: autosplats.render(cloud, size=(4096, 4096), backend="cpu"),
+            lambda: autosplats.read("scene:statue:9M"),
+        ):
+            try:
+                print("done", call())
+            except autosplats.OutOfMemoryError as error:
+                print(error)
+        threads_start()
+        """
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) == 4 and all("memory" in line for line in lines), done.stdout
+
+
+@linux
+def test_no_device(python):
+    done = python(
+        """
+        import autosplats
+        assert autosplats.devices() == []
+        assert autosplats.render("scene:statue:1K", size=(64, 48)).counts["covered"] > 0, "the processor renders"
+        try:
+            autosplats.render("scene:statue:1K", size=(64, 48), backend="gpu")
+        except autosplats.DeviceError as error:
+            print(error)
+        """,
+        # Vulkan finds its drivers by the first, by the second if it is old.
+        env={**os.environ, "VK_DRIVER_FILES": "/none", "VK_ICD_FILENAMES": "/none"},
+    )
+    assert done.returncode == 0, done.stderr
+    assert "there is none" in done.stdout and done.stdout.count("\n") == 1, done.stdout
+
+
 def test_overlapping_arrays():
-    # Rows that share numbers.
-    line = np.arange(1000) / 1024
-    overlapping = np.lib.stride_tricks.as_strided(line, (998, 3), (8, 8))
-    np.testing.assert_array_equal(Cloud(overlapping).xyz, overlapping)
+    # Rows that share numbers, and must not be written to.
+    line = np.random.default_rng(0).random(5000)
+    overlapping = np.lib.stride_tricks.as_strided(line, (4998, 3), (8, 8), writeable=False)
+    apart = overlapping.copy()
+    np.testing.assert_array_equal(Cloud(overlapping).xyz, Cloud(apart).xyz)
+    for found, wanted in zip(autosplats.estimate_normals(overlapping), autosplats.estimate_normals(apart)):
+        np.testing.assert_array_equal(found, wanted)
+    colors = np.lib.stride_tricks.as_strided(np.arange(5000, dtype=np.uint8), (4998, 3), (1, 1), writeable=False)
+    found = autosplats.render(overlapping, colors, size=(64, 48)).array
+    np.testing.assert_array_equal(found, autosplats.render(apart, colors.copy(), size=(64, 48)).array)
 
 
 def test_arrays_that_change_meanwhile(points):
     mine = np.tile(points, (10, 1))
+    colors = np.zeros(mine.shape, dtype=np.uint8)
     stop = threading.Event()
 
     def change() -> None:
@@ -155,12 +216,16 @@ def test_arrays_that_change_meanwhile(points):
             mine[:] = np.nan
             mine[:] = 1e30
             mine[:] = 0.5
+            colors[:] += 1
 
     thread = threading.Thread(target=change)
     thread.start()
     try:
         for _ in range(20):
             autosplats.estimate_normals(mine)
+            # Between two writes no point may have a place.
+            with contextlib.suppress(EmptyError):
+                autosplats.render(mine, colors, size=(64, 48))
     finally:
         stop.set()
         thread.join()

@@ -192,8 +192,19 @@ def test_tensors_of_graphics_cards_are_refused(device):
         def __dlpack_device__(self):
             return (device, 0)
 
-    with pytest.raises(TypeError, match=r"points: .*graphics card.*tensor\.cpu\(\)"):
-        autosplats.render(Tensor())
+    class WithGradient(Tensor):
+        requires_grad = True
+
+        @property
+        def __cuda_array_interface__(self):
+            raise RuntimeError("tensors that require a gradient have none")
+
+        def detach(self):
+            return Tensor()
+
+    for given in (Tensor(), WithGradient()):
+        with pytest.raises(TypeError, match=r"points: .*graphics card.*tensor\.cpu\(\)"):
+            autosplats.render(given)
 
 
 def test_colors_of_every_kind(points, colors):

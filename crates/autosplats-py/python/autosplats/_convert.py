@@ -79,26 +79,36 @@ def held(points: object, name: str = "points") -> Held:
 def array(values: object, name: str) -> Array:
     """An array of what numpy takes, a view where it can be. Arrays of other devices are refused: copying them is the
     caller's choice."""
-    device = getattr(values, "__dlpack_device__", None)
-    is_elsewhere = hasattr(values, "__cuda_array_interface__")
-    if not is_elsewhere and callable(device) and not isinstance(values, np.ndarray):
-        is_elsewhere = int(device()[0]) not in _CPU_DEVICES
-    if is_elsewhere:
+    if getattr(values, "requires_grad", False) and hasattr(values, "detach"):
+        values = values.detach()
+    if _is_elsewhere(values):
         kind = f"{type(values).__module__.partition('.')[0]}.{type(values).__name__}"
         raise TypeError(
             f"{name}: the values of this {kind} are in the memory of a graphics card; copy them first, "
             "as tensor.cpu() or cupy.asnumpy(array) do"
         )
-    if getattr(values, "requires_grad", False) and hasattr(values, "detach"):
-        values = values.detach()
     if type(values).__module__.startswith("numpy.ma"):
         # Masked points have no position. Asking numpy.ma itself would import it, also in a process that was forked
         # while another thread was doing so, which waits for ever.
         return np.asarray(np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan))
     try:
         return np.asarray(values)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, RuntimeError) as error:
         raise TypeError(f"{name}: {type(values).__name__} given, an array of numbers is wanted ({error})") from error
+
+
+def _is_elsewhere(values: object) -> bool:
+    """Whether the values are in memory that the processor does not read."""
+    if isinstance(values, np.ndarray):
+        return False
+    try:
+        if hasattr(values, "__cuda_array_interface__"):
+            return True
+        device = getattr(values, "__dlpack_device__", None)
+        return callable(device) and int(device()[0]) not in _CPU_DEVICES
+    except (ValueError, TypeError, RuntimeError, BufferError):
+        # Tensors without memory have no device; why they are no array is what numpy is told.
+        return False
 
 
 def numbers(values: object, name: str) -> Array:
