@@ -28,7 +28,7 @@ const LIBRARY: Library = Library {
             FACE_CELLS, FIRST_OCTAVE, LISTED_OCTAVES, MOST_NEAR, NEAR_CELLS, NEAR_POINTS, NEAR_REACH, OCTAVES,
             SPARSE_POINTS
         ),
-        constants![ENTRY_WORDS, LARGE_SPLAT_GROUPS, MARGIN_REACH, RANK_BLOCK_FLAGS],
+        constants![ENTRY_WORDS, MARGIN_REACH, RANK_BLOCK_FLAGS],
     ],
 };
 
@@ -49,7 +49,7 @@ passes! {
 indices! {
     /// Indirect dispatches whose number of workgroups depends on counters. A variant names the items and how many a
     /// workgroup takes; `Blocks` are blocks of [`RANK_BLOCK_FLAGS`]. `Drawn` are queries whose splats are drawn, 256 a
-    /// workgroup, after [`LARGE_SPLAT_GROUPS`].
+    /// workgroup, in no fewer than [`drawing_constant`] tells.
     pub(crate) enum Work {
         Visible256,
         VisibleBlocks,
@@ -112,12 +112,16 @@ pub(crate) fn few_constant(gpu: &Gpu) -> (&'static str, f64) {
     ("ITEMS_PER_GROUP", few(gpu).into())
 }
 
+/// The constant by which passes know the fewest workgroups that draw splats, so that large ones are not left to a few
+/// invocations. Software has few threads and pays for each workgroup.
+pub(crate) fn drawing_constant(gpu: &Gpu) -> (&'static str, f64) {
+    ("DRAWING_GROUPS", if gpu.is_software() { 16.0 } else { 128.0 })
+}
+
 /// Words of an entry of a cell around the eye: ordinal and position of a point.
 const ENTRY_WORDS: usize = 4;
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = crate::gpu::LARGE_GROUP;
-/// Workgroups that take the large splats from their list, in front of those for all others.
-pub(crate) const LARGE_SPLAT_GROUPS: u32 = 128;
 /// Flags that one workgroup ranks: a block.
 pub(crate) const RANK_BLOCK_FLAGS: u32 = 2048;
 
@@ -158,7 +162,7 @@ indices! {
         RangeHigh,
         /// Pixels that show a surface.
         Covered,
-        /// Splats that are too large for one invocation.
+        /// Splats that are too large for one workgroup.
         Large,
         /// Queries of each round that `search_four` leaves to `search`.
         LeftActive,
@@ -296,7 +300,7 @@ impl WorkPass {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Pass::new(gpu, &WORK, &[few_constant(gpu)]).map(Self)
+        Pass::new(gpu, &WORK, &[few_constant(gpu), drawing_constant(gpu)]).map(Self)
     }
 
     /// The step to run after counters of the search have changed.
@@ -379,7 +383,7 @@ impl ProjectPasses {
             compact: pass(&COMPACT)?,
             gather: pass(&GATHER)?,
             split_count: pass(&SPLIT_COUNT)?,
-            split: Pass::new(gpu, &SPLIT, &[few_constant(gpu)])?,
+            split: Pass::new(gpu, &SPLIT, &[few_constant(gpu), drawing_constant(gpu)])?,
         })
     }
 
