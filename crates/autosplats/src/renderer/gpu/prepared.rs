@@ -12,7 +12,7 @@ use crate::fit::orient::gpu::OrientPasses;
 use crate::gpu::{FrameUniform, Gpu, Step};
 use crate::points::Points;
 use crate::project::DeviceCloud;
-use crate::project::gpu::{ProjectPasses, ScreenBuffers};
+use crate::project::gpu::{Nearest, ProjectPasses, ScreenBuffers};
 use crate::renderer::attributes::SplatAttributes;
 use crate::renderer::frame::Stage;
 use crate::renderer::rules::Rules;
@@ -52,7 +52,7 @@ pub(super) struct Passes {
 impl Passes {
     pub(super) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let (project, others) = join(
-            || ProjectPasses::new(gpu, gpu.int64_atomics()),
+            || ProjectPasses::new(gpu, Nearest::best(gpu)),
             || join(|| Ok::<_, Error>((PastPasses::new(gpu)?, FitPasses::new(gpu)?)), || ShadePasses::new(gpu)),
         );
         let (past_and_fit, shade) = others;
