@@ -13,7 +13,7 @@
 
 use super::layers::{Channels, LayerBuffers};
 use super::trim::blurred::{self, BLOCK_PX};
-use super::trim::{self, ACROSS, LINES, OWN_SIXTEENTHS};
+use super::trim::{self, ACROSS, LINES, OWN_SIXTEENTHS, SIDES};
 use super::{centers, raster, setup};
 use crate::Error;
 use crate::adapt::FrameStatistics;
@@ -63,7 +63,8 @@ const LIBRARY: Library = Library {
             DIRECTIONS = ACROSS.len(),
             EXTRA_STRIDES = trim::EXTRA_STRIDES as i32,
             LINES = LINES.len(),
-            OWN_SIXTEENTHS = [OWN_SIXTEENTHS as u32, (OWN_SIXTEENTHS >> 32) as u32],
+            OWN_SIXTEENTHS = words(OWN_SIXTEENTHS),
+            SIDES = side_masks(),
         ],
         constants![BATCH, CELL_BITS, FAN, FAN_BITS, MARGIN_REACH, MAX_GROUP_PX, PATCH, RANK_BLOCK_FLAGS],
         constants![SQUARE, SUPPORT, TOP_NODES],
@@ -148,7 +149,7 @@ impl SplatBuffers {
             tree: gpu.storage::<[u32; 2]>("tree of splats", nodes)?,
             changes: gpu.storage::<u32>("changes of splats", screen_capacity as usize)?,
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
-            blocks: gpu.storage::<u32>("blocks of pixels", block_count(size) as usize)?,
+            blocks: gpu.storage::<[u32; 2]>("blocks of pixels", block_count(size) as usize)?,
             no_noise: gpu.storage::<FrameStatistics>("no noise", 1)?,
         })
     }
@@ -296,6 +297,16 @@ impl SplatPasses {
         steps.push(pass.step(gpu, &trim, patches(screen, [SQUARE; 2])));
         steps
     }
+}
+
+/// The masks of the sides ahead, then those of the sides behind.
+fn side_masks() -> [[u32; 2]; 2 * ACROSS.len()] {
+    std::array::from_fn(|at| words(SIDES[at % ACROSS.len()][at / ACROSS.len()]))
+}
+
+/// The words of a mask.
+fn words(mask: u64) -> [u32; 2] {
+    [mask as u32, (mask >> 32) as u32]
 }
 
 /// Workgroups for the upper levels of the tree; at least one, which stores the number of splats.
