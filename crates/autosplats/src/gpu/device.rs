@@ -78,6 +78,9 @@ fn is_software(info: &wgpu::AdapterInfo) -> bool {
 /// Features for one 64-bit atomic minimum.
 pub(crate) const INT64_ATOMICS: wgpu::Features =
     wgpu::Features::SHADER_INT64.union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
+/// Features for 64-bit atomics of any kind, and for talk among the invocations of a subgroup.
+pub(crate) const INT64_IN_LANES: wgpu::Features =
+    INT64_ATOMICS.union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS).union(wgpu::Features::SUBGROUP);
 
 fn usable_adapters() -> Vec<wgpu::Adapter> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
@@ -159,7 +162,7 @@ impl Gpu {
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self, Error> {
         let timing = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
-        let optional = INT64_ATOMICS | timing | wgpu::Features::FLOAT32_BLENDABLE | wgpu::Features::PIPELINE_CACHE;
+        let optional = INT64_IN_LANES | timing | wgpu::Features::FLOAT32_BLENDABLE | wgpu::Features::PIPELINE_CACHE;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("autosplats"),
             required_features: adapter.features() & optional,
@@ -199,11 +202,6 @@ impl Gpu {
     /// Whether the device is a program on the CPU.
     pub(crate) fn is_software(&self) -> bool {
         is_software(&self.device.adapter_info())
-    }
-
-    /// Whether depth and index of a point fit one atomic operation.
-    pub(crate) fn int64_atomics(&self) -> bool {
-        self.device.features().contains(INT64_ATOMICS)
     }
 
     /// Returns what `make` creates, if the device accepts it.

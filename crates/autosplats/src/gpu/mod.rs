@@ -23,7 +23,7 @@ pub(crate) use compiled::Pass;
 #[cfg(test)]
 pub(crate) use device::test_gpu;
 pub use device::{AdapterSummary, adapters};
-pub(crate) use device::{Gpu, INT64_ATOMICS};
+pub(crate) use device::{Gpu, INT64_ATOMICS, INT64_IN_LANES};
 pub(crate) use frame::FrameUniform;
 pub(crate) use link::{Constant, File, InWgsl, LARGE_GROUP, Library, SMALL_GROUP, constants, files, indices, link};
 pub(crate) use raster::{DepthMask, Draw, Load, RasterPass, Target, Targets};

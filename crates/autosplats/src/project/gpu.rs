@@ -4,7 +4,9 @@ pub(crate) use super::Round;
 use super::device_cloud::{Chunk, DeviceCloud};
 use super::{MARGIN_REACH, ScreenPoint, cpu, near};
 use crate::Error;
-use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, INT64_ATOMICS, Library, Pass, Step, constants, files, indices, passes};
+use crate::gpu::{
+    DISPATCH_BYTES, Gpu, Groups, INT64_ATOMICS, INT64_IN_LANES, Library, Pass, Step, constants, files, indices, passes,
+};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
@@ -28,7 +30,7 @@ const LIBRARY: Library = Library {
             FACE_CELLS, FIRST_OCTAVE, LISTED_OCTAVES, MOST_NEAR, NEAR_CELLS, NEAR_POINTS, NEAR_REACH, OCTAVES,
             SPARSE_POINTS
         ),
-        constants![ENTRY_WORDS, LARGE_SPLAT_GROUPS, MARGIN_REACH, RANK_BLOCK_FLAGS],
+        constants![ENTRY_WORDS, MARGIN_REACH, POINTS_PER_LANE, RANK_BLOCK_FLAGS],
     ],
 };
 
@@ -36,6 +38,7 @@ passes! {
     "project", LIBRARY;
     CLEAR = "clear",
     PROJECT = "project" needs INT64_ATOMICS,
+    PROJECT_LANES = "project_lanes" needs INT64_IN_LANES,
     PROJECT_32 = "project_32",
     OCCUPANCY = "occupancy",
     COUNT = "count",
@@ -49,7 +52,7 @@ passes! {
 indices! {
     /// Indirect dispatches whose number of workgroups depends on counters. A variant names the items and how many a
     /// workgroup takes; `Blocks` are blocks of [`RANK_BLOCK_FLAGS`]. `Drawn` are queries whose splats are drawn, 256 a
-    /// workgroup, after [`LARGE_SPLAT_GROUPS`].
+    /// workgroup, in no fewer than [`drawing_constant`] tells.
     pub(crate) enum Work {
         Visible256,
         VisibleBlocks,
@@ -112,12 +115,18 @@ pub(crate) fn few_constant(gpu: &Gpu) -> (&'static str, f64) {
     ("ITEMS_PER_GROUP", few(gpu).into())
 }
 
+/// The constant by which passes know the fewest workgroups that draw splats, so that large ones are not left to a few
+/// invocations. Software has few threads and pays for each workgroup.
+pub(crate) fn drawing_constant(gpu: &Gpu) -> (&'static str, f64) {
+    ("DRAWING_GROUPS", if gpu.is_software() { 16.0 } else { 128.0 })
+}
+
+/// Points that an invocation of `project_lanes` takes, one after the other.
+const POINTS_PER_LANE: u32 = 4;
 /// Words of an entry of a cell around the eye: ordinal and position of a point.
 const ENTRY_WORDS: usize = 4;
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = crate::gpu::LARGE_GROUP;
-/// Workgroups that take the large splats from their list, in front of those for all others.
-pub(crate) const LARGE_SPLAT_GROUPS: u32 = 128;
 /// Flags that one workgroup ranks: a block.
 pub(crate) const RANK_BLOCK_FLAGS: u32 = 2048;
 
@@ -158,9 +167,9 @@ indices! {
         RangeHigh,
         /// Pixels that show a surface.
         Covered,
-        /// Splats that are too large for one invocation.
+        /// Splats that are too large for one workgroup.
         Large,
-        /// Queries of each round that `search_four` leaves to `search`.
+        /// Queries of each round that one pass of the search leaves to another.
         LeftActive,
         LeftRecovered,
     }
@@ -296,7 +305,7 @@ impl WorkPass {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Pass::new(gpu, &WORK, &[few_constant(gpu)]).map(Self)
+        Pass::new(gpu, &WORK, &[few_constant(gpu), drawing_constant(gpu)]).map(Self)
     }
 
     /// The step to run after counters of the search have changed.
@@ -312,19 +321,50 @@ impl WorkPass {
     }
 }
 
-/// The way each pixel finds its nearest point.
+/// The ways in which each pixel finds its nearest point, by what a device has. All give the same.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Nearest {
+    /// With all 64-bit atomics and subgroups.
+    InLanes,
+    /// With a 64-bit atomic minimum.
+    Once,
+    /// With 32-bit atomics, by a pass that runs twice.
+    Twice,
+}
+
+impl Nearest {
+    /// The best way on a device. Software runs a lane after the other, so lanes spare each other nothing.
+    pub(crate) fn best(gpu: &Gpu) -> Self {
+        let ways = if gpu.is_software() { &[Self::Once][..] } else { &[Self::InLanes, Self::Once] };
+        ways.iter().copied().find(|way| way.fits(gpu)).unwrap_or(Self::Twice)
+    }
+
+    /// Whether the device has the features for it.
+    pub(crate) fn fits(self, gpu: &Gpu) -> bool {
+        let needs = match self {
+            Self::InLanes => INT64_IN_LANES,
+            Self::Once => INT64_ATOMICS,
+            Self::Twice => wgpu::Features::empty(),
+        };
+        gpu.device.features().contains(needs)
+    }
+}
+
+/// The pass of a [`Nearest`].
 #[derive(Debug)]
 enum NearestPass {
-    /// With 64-bit atomics.
-    Once(Pass),
+    /// A pass, and the points that its workgroups take.
+    Once(Pass, u32),
     /// With 32-bit atomics: the pass, and the uniform of each turn.
     Twice(Pass, [wgpu::Buffer; 2]),
 }
 
 impl NearestPass {
-    fn new(gpu: &Gpu, int64: bool) -> Result<Self, Error> {
-        if int64 {
-            return Ok(Self::Once(Pass::new(gpu, &PROJECT, &[])?));
+    fn new(gpu: &Gpu, way: Nearest) -> Result<Self, Error> {
+        match way {
+            Nearest::InLanes => return Ok(Self::Once(Pass::new(gpu, &PROJECT_LANES, &[])?, POINTS_PER_LANE * GROUP)),
+            Nearest::Once => return Ok(Self::Once(Pass::new(gpu, &PROJECT, &[])?, GROUP)),
+            Nearest::Twice => {}
         }
         let turn = |turn: u32| {
             let told = gpu.uniform::<u32>("turn")?;
@@ -335,18 +375,18 @@ impl NearestPass {
     }
 
     fn steps(&self, gpu: &Gpu, frame: &wgpu::Buffer, cloud: &DeviceCloud, screen: &ScreenBuffers) -> Vec<Step> {
-        let run = |pass: &Pass, turn: Option<&wgpu::Buffer>| -> Vec<Step> {
+        let run = |pass: &Pass, per_group: u32, turn: Option<&wgpu::Buffer>| -> Vec<Step> {
             let step = |chunk: &Chunk| {
                 let ScreenBuffers { keys, counters, sixteenths, near, .. } = screen;
                 let buffers = [frame, &chunk.uniform, &chunk.positions, keys, counters, sixteenths, near];
                 let buffers: Vec<_> = buffers.into_iter().chain(turn).collect();
-                pass.step(gpu, &buffers, chunk.capacity.div_ceil(GROUP))
+                pass.step(gpu, &buffers, chunk.capacity.div_ceil(per_group))
             };
             cloud.chunks().iter().map(step).collect()
         };
         match self {
-            Self::Once(pass) => run(pass, None),
-            Self::Twice(pass, turns) => turns.iter().flat_map(|turn| run(pass, Some(turn))).collect(),
+            Self::Once(pass, per_group) => run(pass, *per_group, None),
+            Self::Twice(pass, turns) => turns.iter().flat_map(|turn| run(pass, GROUP, Some(turn))).collect(),
         }
     }
 }
@@ -365,21 +405,21 @@ pub(crate) struct ProjectPasses {
 }
 
 impl ProjectPasses {
-    /// Compiles the passes, with 64-bit atomics if `int64`, else with a 32-bit pass that runs twice.
+    /// Compiles the passes for one way to find the nearest points.
     ///
     /// # Errors
     /// [`Error::Device`].
-    pub(crate) fn new(gpu: &Gpu, int64: bool) -> Result<Self, Error> {
+    pub(crate) fn new(gpu: &Gpu, way: Nearest) -> Result<Self, Error> {
         let pass = |source| Pass::new(gpu, source, &[]);
         Ok(Self {
             clear: pass(&CLEAR)?,
-            nearest: NearestPass::new(gpu, int64)?,
+            nearest: NearestPass::new(gpu, way)?,
             occupancy: pass(&OCCUPANCY)?,
             count: pass(&COUNT)?,
             compact: pass(&COMPACT)?,
             gather: pass(&GATHER)?,
             split_count: pass(&SPLIT_COUNT)?,
-            split: Pass::new(gpu, &SPLIT, &[few_constant(gpu)])?,
+            split: Pass::new(gpu, &SPLIT, &[few_constant(gpu), drawing_constant(gpu)])?,
         })
     }
 

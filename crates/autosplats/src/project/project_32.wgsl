@@ -42,7 +42,10 @@ fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
                 count_dropped(projected.slot);
             }
         } else if turn == 0u {
-            atomicMin(&keys[projected.slot].depth, depth);
+            // Most points lie behind others; a load shows this.
+            if depth < atomicLoad(&keys[projected.slot].depth) {
+                atomicMin(&keys[projected.slot].depth, depth);
+            }
             add_sixteenth(projected.sixteenths);
         } else if atomicLoad(&keys[projected.slot].depth) == depth {
             atomicMin(&keys[projected.slot].ordinal, ordinal_of(index));

@@ -28,7 +28,7 @@ use crate::project::gpu::{Counter, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, SlotTable, Uploader};
 use crate::search::SearchEngine;
 use crate::search::gpu::{check_engine, convergence};
-use crate::shade::gpu::{ReadPicture, ShadeUniform, check_texture, finish};
+use crate::shade::gpu::{ReadPicture, check_texture, finish};
 use crate::shade::{Image, Scene};
 use crate::splat::{GBuffer, LayerBuffers};
 
@@ -273,19 +273,8 @@ impl GpuRenderer {
             ..
         } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
-        let cloud = points.scene();
-        let exposure = exposure.of(cloud, &settings.shading);
-        let values = wanted.scalar(points).map(|values| values.about()).unwrap_or_default();
-        let scene = Scene {
-            view,
-            up: upward.of(cloud, &settings.shading.color),
-            origin: cloud.origin(),
-            unit,
-            exposure,
-            values,
-        };
-        let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        prepared.write_uniforms(gpu, frame, (screen, points, None), &rules, settings, &uniform);
+        let scene = scene(points, view, &wanted, unit, settings, (upward, exposure));
+        prepared.write_uniforms(gpu, frame, (screen, points, None), &rules, settings, &scene);
 
         let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock).timing_each(*times_passes);
@@ -310,7 +299,7 @@ impl GpuRenderer {
                 [_, _, _, surface, cover, extras] => prepared.layers.to_host(screen.margin, surface, cover, extras),
                 _ => GBuffer::default(),
             };
-            layers.scalar_about = values;
+            layers.scalar_about = scene.values;
             (counters, value_range)
         })?;
         let waited_ms = waited.elapsed().as_secs_f64() * 1e3;
@@ -363,21 +352,9 @@ impl GpuRenderer {
         let screen = view.with_margin(rules.margin_px);
         let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
-        let cloud = points.scene();
-        let exposure = exposure.of(cloud, &settings.shading);
-        let values = wanted.scalar(points).map(|values| values.about()).unwrap_or_default();
-        let scene = Scene {
-            view,
-            up: upward.of(cloud, &settings.shading.color),
-            origin: cloud.origin(),
-            unit,
-            exposure,
-            values,
-        };
-        let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
+        let scene = scene(points, view, &wanted, unit, settings, (upward, exposure));
         let format = texture.format();
-        let now = (&screen, points, Some(format));
-        prepared.write_uniforms(gpu, frame, now, &rules, settings, &uniform.into_format(format));
+        prepared.write_uniforms(gpu, frame, (&screen, points, Some(format)), &rules, settings, &scene);
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(recorder.encoder(), texture)?;
@@ -421,6 +398,26 @@ impl GpuRenderer {
             self.prepared = Some(Prepared::new(gpu, shape, passes, resident, &rules, settings)?);
         }
         Ok(rules)
+    }
+}
+
+/// What shading needs to know of a frame.
+fn scene<'a>(
+    points: Points<'_>,
+    view: &'a View,
+    wanted: &SplatAttributes,
+    unit: f64,
+    settings: &Settings,
+    (upward, exposure): (&mut Upward, &mut Exposure),
+) -> Scene<'a> {
+    let cloud = points.scene();
+    Scene {
+        view,
+        up: upward.of(cloud, &settings.shading.color),
+        origin: cloud.origin(),
+        unit,
+        exposure: exposure.of(cloud, &settings.shading),
+        values: wanted.scalar(points).map(|values| values.about()).unwrap_or_default(),
     }
 }
 

@@ -1,5 +1,6 @@
 // Numbers of workgroups of the dispatches that take queries. The including pass binds `arguments`.
 
+#import drawing_groups
 #import put_work
 
 // Items that a workgroup processes together.
@@ -21,9 +22,4 @@ fn put_recovered(len: u32, active_len: u32) {
     put_groups(RECOVERED_DRAWN, drawing_groups(len));
     put_work(QUERIES256, active_len + len, LARGE_GROUP);
     put_groups(QUERIES_DRAWN, drawing_groups(active_len + len));
-}
-
-// Workgroups that draw splats: those for large splats come first.
-fn drawing_groups(len: u32) -> u32 {
-    return LARGE_SPLAT_GROUPS + (len + LARGE_GROUP - 1u) / LARGE_GROUP;
 }

@@ -1,5 +1,6 @@
-// Visibility pass: the nearest depth, pushed back by ε, of the splats that cover each pixel [Paper, §7]. An invocation
-// draws a splat, and a team of invocations a large one; a minimum does not depend on the order.
+// Visibility pass: the nearest depth, pushed back by ε, of the splats that cover each pixel [Paper, §7]. A workgroup
+// shares out the rows of its splats (`lines`), and teams of invocations draw large ones (`large`). A minimum does not
+// depend on the order.
 //
 // Reads: counters, splats, tree, large. Reads and writes: depth_map.
 
@@ -7,6 +8,7 @@
 #import draw_depth
 #import groups
 #import large
+#import lines
 #import splat
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
@@ -17,28 +19,31 @@
 
 // Whether to draw only the recovered splats.
 override RECOVERED_ONLY: bool;
-override MAX_INVOCATION_PX: u32;
-
 @compute @workgroup_size(LARGE_GROUP)
 fn depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let group = group_index(workgroup);
     let first = select(0u, counters[ACTIVE], RECOVERED_ONLY);
-    if group < LARGE_SPLAT_GROUPS {
-        for (var place = first_large(group, local); place < counters[LARGE]; place += NEXT_LARGE) {
-            let index = large[place];
-            let bounds = tree[level_start(SPLATS) + index];
-            if index >= first && !is_empty(bounds) {
-                draw_together(splats[index], bounds, local);
-            }
+    let len = counters[ACTIVE] + counters[RECOVERED] - first;
+    let index = group * LARGE_GROUP + local;
+    clear_lines(local);
+    if index < len {
+        let bounds = tree[level_start(SPLATS) + first + index];
+        if !is_empty(bounds) && bounds_area(bounds) <= MAX_GROUP_PX {
+            tell_lines(bounds, local);
         }
-        return;
     }
-    let index = first + (group - LARGE_SPLAT_GROUPS) * LARGE_GROUP + local;
-    if index >= counters[ACTIVE] + counters[RECOVERED] {
-        return;
+    let lines = line_count();
+    for (var at = local; at < lines; at += LARGE_GROUP) {
+        let place = splat_line(at);
+        let drawn = first + group * LARGE_GROUP + place.x;
+        let bounds = tree[level_start(SPLATS) + drawn];
+        draw_row(splats[drawn], bounds, firsts(bounds).y + place.y);
     }
-    let bounds = tree[level_start(SPLATS) + index];
-    if !is_empty(bounds) && bounds_area(bounds) <= MAX_INVOCATION_PX {
-        draw_alone(splats[index], bounds);
+    for (var place = first_large(group, local); place < counters[LARGE]; place += next_large(len)) {
+        let drawn = large[place];
+        let bounds = tree[level_start(SPLATS) + drawn];
+        if drawn >= first && !is_empty(bounds) {
+            draw_together(splats[drawn], bounds, local);
+        }
     }
 }

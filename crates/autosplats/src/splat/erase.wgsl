@@ -1,6 +1,5 @@
 // Depth refinement: erases the depths of splats that just died, wherever nothing was in front of them [Paper, §7, Depth
-// Refinement]. The pass marks the cells with erased depths. An invocation erases a splat, and a team of invocations a
-// large one (`large`).
+// Refinement]. The pass marks the cells with erased depths. Splats are shared out as in `depth`.
 //
 // Reads: counters, splats, tree, changes, large. Reads and writes: depth_map, cells.
 
@@ -9,6 +8,7 @@
 #import fragment
 #import groups
 #import large
+#import lines
 #import redraw
 #import splat
 
@@ -20,34 +20,34 @@
 @group(0) @binding(6) var<storage, read_write> depth_map: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read_write> cells: array<atomic<u32>>;
 
-override MAX_INVOCATION_PX: u32;
-
 @compute @workgroup_size(LARGE_GROUP)
 fn erase(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let group = group_index(workgroup);
-    if group < LARGE_SPLAT_GROUPS {
-        for (var place = first_large(group, local); place < counters[LARGE]; place += NEXT_LARGE) {
-            let index = large[place];
-            if changes[index] == DIED {
-                erase_together(index, local);
-            }
+    let len = counters[ACTIVE] + counters[RECOVERED];
+    let index = group * LARGE_GROUP + local;
+    clear_lines(local);
+    if index < len && changes[index] == DIED {
+        let bounds = living_bounds(tree[level_start(SPLATS) + index]);
+        if bounds_area(bounds) <= MAX_GROUP_PX {
+            tell_lines(bounds, local);
         }
-        return;
     }
-    let index = (group - LARGE_SPLAT_GROUPS) * LARGE_GROUP + local;
-    if index >= counters[ACTIVE] + counters[RECOVERED] || changes[index] != DIED {
-        return;
-    }
-    let bounds = living_bounds(tree[level_start(SPLATS) + index]);
-    if bounds_area(bounds) > MAX_INVOCATION_PX {
-        return;
-    }
-    let splat = splats[index];
-    for (var row = firsts(bounds).y; row <= lasts(bounds).y; row++) {
-        let line = line_of(splat, row);
+    let lines = line_count();
+    for (var at = local; at < lines; at += LARGE_GROUP) {
+        let place = splat_line(at);
+        let drawn = group * LARGE_GROUP + place.x;
+        let bounds = living_bounds(tree[level_start(SPLATS) + drawn]);
+        let splat = splats[drawn];
+        let line = line_of(splat, firsts(bounds).y + place.y);
         let span = span_of(splat, line, bounds);
         for (var column = span.x; column <= span.y; column++) {
             erase_depth(splat, line, u32(column));
+        }
+    }
+    for (var place = first_large(group, local); place < counters[LARGE]; place += next_large(len)) {
+        let drawn = large[place];
+        if changes[drawn] == DIED {
+            erase_together(drawn, local);
         }
     }
 }

@@ -1,10 +1,10 @@
 //! Splatting on the GPU.
 //!
 //! # How it works
-//! The depth map takes minima, which do not depend on the order. An invocation draws a splat, a team of 64 a large one,
-//! by atomic minima of integers that order as depths do. Few splats die in a refinement, and most of them were hidden.
-//! So refinement erases their depths from the map, and redraws only splats that meet a cell of 8×8 pixels with erased
-//! depths (`imports/redraw.wgsl`).
+//! The depth map takes minima, which do not depend on the order. A workgroup shares out the rows of 256 splats among
+//! its invocations, and teams of 64 draw large splats, by atomic minima of integers that order as depths do. Few splats
+//! die in a refinement, and most of them were hidden. So refinement erases their depths from the map, and redraws only
+//! splats that meet a cell of 8×8 pixels with erased depths (`imports/redraw.wgsl`).
 //!
 //! Attributes are sums, which have to equal those of the CPU and be the same each time. So a pixel draws its splats in
 //! list order. A workgroup per patch of 16×32 pixels finds them by a tree over the list instead of bins
@@ -13,14 +13,14 @@
 
 use super::layers::{Channels, LayerBuffers};
 use super::trim::blurred::{self, BLOCK_PX};
-use super::trim::{self, ACROSS, LINES, OWN_SIXTEENTHS};
+use super::trim::{self, ACROSS, LINES, OWN_SIXTEENTHS, SIDES};
 use super::{centers, raster, setup};
 use crate::Error;
 use crate::adapt::FrameStatistics;
 use crate::fit::{SUPPORT, Surfel};
 use crate::gpu::{Gpu, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
 use crate::project::MARGIN_REACH;
-use crate::project::gpu::{Counter, LARGE_SPLAT_GROUPS, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, few_constant};
+use crate::project::gpu::{Counter, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, drawing_constant, few_constant};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
@@ -32,6 +32,7 @@ const LIBRARY: Library = Library {
         "fragment",
         "hidden",
         "large",
+        "lines",
         "marked",
         "patch",
         "recovered",
@@ -62,9 +63,10 @@ const LIBRARY: Library = Library {
             DIRECTIONS = ACROSS.len(),
             EXTRA_STRIDES = trim::EXTRA_STRIDES as i32,
             LINES = LINES.len(),
-            OWN_SIXTEENTHS = [OWN_SIXTEENTHS as u32, (OWN_SIXTEENTHS >> 32) as u32],
+            OWN_SIXTEENTHS = words(OWN_SIXTEENTHS),
+            SIDES = side_masks(),
         ],
-        constants![BATCH, CELL_BITS, FAN, FAN_BITS, LARGE_SPLAT_GROUPS, MARGIN_REACH, PATCH, RANK_BLOCK_FLAGS],
+        constants![BATCH, CELL_BITS, FAN, FAN_BITS, MARGIN_REACH, MAX_GROUP_PX, PATCH, RANK_BLOCK_FLAGS],
         constants![SQUARE, SUPPORT, TOP_NODES],
     ],
 };
@@ -85,9 +87,8 @@ passes! {
     TRIM = "trim",
 }
 
-/// Most pixels of a splat's bounds that one invocation draws. On hardware the other invocations of its group wait for
-/// it; on a software device, the second value, a workgroup costs more.
-const MAX_INVOCATION_PX: [u32; 2] = [128, 1024];
+/// Most pixels of a splat's bounds whose rows one workgroup shares out among its invocations.
+const MAX_GROUP_PX: u32 = 1024;
 /// Columns and rows of a patch, and splats that are drawn into it at a time.
 const PATCH: [u32; 2] = [16, 32];
 const BATCH: u32 = 64;
@@ -124,7 +125,7 @@ pub(crate) struct LayerRules<'a> {
 pub(crate) struct SplatBuffers {
     splats: wgpu::Buffer,
     tree: wgpu::Buffer,
-    /// Indices of splats too large for one invocation.
+    /// Indices of splats too large for one workgroup.
     large: wgpu::Buffer,
     /// Change of each splat in the last refinement, and the marks of cells with erased depths (`imports/redraw.wgsl`).
     changes: wgpu::Buffer,
@@ -148,7 +149,7 @@ impl SplatBuffers {
             tree: gpu.storage::<[u32; 2]>("tree of splats", nodes)?,
             changes: gpu.storage::<u32>("changes of splats", screen_capacity as usize)?,
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
-            blocks: gpu.storage::<u32>("blocks of pixels", block_count(size) as usize)?,
+            blocks: gpu.storage::<[u32; 2]>("blocks of pixels", block_count(size) as usize)?,
             no_noise: gpu.storage::<FrameStatistics>("no noise", 1)?,
         })
     }
@@ -182,9 +183,9 @@ impl SplatPasses {
     /// [`Error::Device`], [`Error::DeviceMemory`].
     pub(crate) fn new(gpu: &Gpu, channels: Channels, linear: &[f32; 256]) -> Result<Self, Error> {
         let pass = |source| Pass::new(gpu, source, &[]);
-        let most_px = ("MAX_INVOCATION_PX", MAX_INVOCATION_PX[usize::from(gpu.is_software())].into());
-        let set_up = |recovered: f64| Pass::new(gpu, &SET_UP, &[("RECOVERED_ONLY", recovered), most_px]);
-        let depth = |recovered: f64| Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), most_px]);
+        let set_up = |recovered: f64| Pass::new(gpu, &SET_UP, &[("RECOVERED_ONLY", recovered)]);
+        let groups = drawing_constant(gpu);
+        let depth = |recovered: f64| Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), groups]);
         let Channels { color, scalar, measures, backs } = channels;
         let slots = |carried: bool| if carried { f64::from(BATCH) } else { 1.0 };
         let attributes = [
@@ -205,10 +206,10 @@ impl SplatPasses {
             boxes: pass(&BOXES)?,
             depth: [depth(0.0)?, depth(1.0)?],
             recover_count: pass(&RECOVER_COUNT)?,
-            recover: Pass::new(gpu, &RECOVER, &[few_constant(gpu)])?,
+            recover: Pass::new(gpu, &RECOVER, &[few_constant(gpu), groups])?,
             refine: pass(&REFINE)?,
-            erase: Pass::new(gpu, &ERASE, &[most_px])?,
-            redraw: Pass::new(gpu, &REDRAW, &[most_px])?,
+            erase: Pass::new(gpu, &ERASE, &[groups])?,
+            redraw: Pass::new(gpu, &REDRAW, &[groups])?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
             sum_blocks: pass(&SUM_BLOCKS)?,
             trim: [trim(0.0)?, trim(1.0)?],
@@ -296,6 +297,16 @@ impl SplatPasses {
         steps.push(pass.step(gpu, &trim, patches(screen, [SQUARE; 2])));
         steps
     }
+}
+
+/// The masks of the sides ahead, then those of the sides behind.
+fn side_masks() -> [[u32; 2]; 2 * ACROSS.len()] {
+    std::array::from_fn(|at| words(SIDES[at % ACROSS.len()][at / ACROSS.len()]))
+}
+
+/// The words of a mask.
+fn words(mask: u64) -> [u32; 2] {
+    [mask as u32, (mask >> 32) as u32]
 }
 
 /// Workgroups for the upper levels of the tree; at least one, which stores the number of splats.

@@ -1,5 +1,5 @@
 // Depth refinement: redraws the living splats that meet cells with erased depths, and splats that just revived. Taking
-// a minimum twice changes nothing [Paper, §7, Depth Refinement]. Splats are drawn as in `depth`.
+// a minimum twice changes nothing [Paper, §7, Depth Refinement]. Splats are shared out as in `depth`.
 //
 // Reads: counters, splats, tree, changes, cells, large. Reads and writes: depth_map.
 
@@ -7,6 +7,7 @@
 #import draw_depth
 #import groups
 #import large
+#import lines
 #import marked
 #import splat
 
@@ -18,28 +19,31 @@
 @group(0) @binding(6) var<storage, read> large: array<u32>;
 @group(0) @binding(7) var<storage, read_write> depth_map: array<atomic<u32>>;
 
-override MAX_INVOCATION_PX: u32;
-
 @compute @workgroup_size(LARGE_GROUP)
 fn redraw(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let group = group_index(workgroup);
-    if group < LARGE_SPLAT_GROUPS {
-        for (var place = first_large(group, local); place < counters[LARGE]; place += NEXT_LARGE) {
-            let index = large[place];
-            let bounds = tree[level_start(SPLATS) + index];
-            // Dead splats count as empty.
-            if !is_empty(bounds) && is_redrawn(index, bounds) {
-                draw_together(splats[index], bounds, local);
-            }
+    let len = counters[ACTIVE] + counters[RECOVERED];
+    let index = group * LARGE_GROUP + local;
+    clear_lines(local);
+    if index < len {
+        let bounds = tree[level_start(SPLATS) + index];
+        if !is_empty(bounds) && bounds_area(bounds) <= MAX_GROUP_PX && is_redrawn(index, bounds) {
+            tell_lines(bounds, local);
         }
-        return;
     }
-    let index = (group - LARGE_SPLAT_GROUPS) * LARGE_GROUP + local;
-    if index >= counters[ACTIVE] + counters[RECOVERED] {
-        return;
+    let lines = line_count();
+    for (var at = local; at < lines; at += LARGE_GROUP) {
+        let place = splat_line(at);
+        let drawn = group * LARGE_GROUP + place.x;
+        let bounds = tree[level_start(SPLATS) + drawn];
+        draw_row(splats[drawn], bounds, firsts(bounds).y + place.y);
     }
-    let bounds = tree[level_start(SPLATS) + index];
-    if !is_empty(bounds) && bounds_area(bounds) <= MAX_INVOCATION_PX && is_redrawn(index, bounds) {
-        draw_alone(splats[index], bounds);
+    for (var place = first_large(group, local); place < counters[LARGE]; place += next_large(len)) {
+        let drawn = large[place];
+        let bounds = tree[level_start(SPLATS) + drawn];
+        // Dead splats count as empty.
+        if !is_empty(bounds) && is_redrawn(drawn, bounds) {
+            draw_together(splats[drawn], bounds, local);
+        }
     }
 }

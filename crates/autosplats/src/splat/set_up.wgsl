@@ -13,14 +13,12 @@
 @group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
 @group(0) @binding(4) var<storage, read_write> tree: array<vec2u>;
-// Splats too large for one invocation, in any order.
+// Splats too large for one workgroup, in any order.
 @group(0) @binding(5) var<storage, read_write> large: array<u32>;
 @group(0) @binding(6) var<storage, read_write> centers: array<atomic<u32>>;
 
 // Whether only the recovered surfels are new.
 override RECOVERED_ONLY: bool;
-// Most pixels of a splat's bounds that one invocation draws.
-override MAX_INVOCATION_PX: u32;
 
 // Empty bounds: the first pixel lies beyond all, the last is 0.
 const NOWHERE = 0x7fffu;
@@ -91,7 +89,7 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let bounds = vec2u(x, y);
     tree[place] = bounds;
     if !is_empty(bounds) {
-        if bounds_area(bounds) > MAX_INVOCATION_PX {
+        if bounds_area(bounds) > MAX_GROUP_PX {
             large[atomicAdd(&counters[LARGE], 1u)] = index;
         }
         add_center(center_px, surfel.pixel);

@@ -88,7 +88,7 @@ pub(super) const ACROSS: [[isize; 2]; 2 * LINES.len()] = [
 ];
 /// Masks of the two sides of each direction, in the layout of [`Sixteenths::around`]: the sixteenths ahead, then those
 /// behind. Only sixteenths within a pixel of the middle count; those level with the middle belong to both sides.
-const SIDES: [[u64; 2]; ACROSS.len()] = {
+pub(super) const SIDES: [[u64; 2]; ACROSS.len()] = {
     let mut sides = [[0; 2]; ACROSS.len()];
     let mut at = 0;
     while at < 64 * ACROSS.len() {

@@ -18,7 +18,7 @@
 @group(0) @binding(5) var<storage, read> centers: array<u32>;
 @group(0) @binding(6) var<storage, read> sixteenths: array<u32>;
 @group(0) @binding(7) var<storage, read> statistics: FrameStatistics;
-@group(0) @binding(8) var<storage, read> blocks: array<u32>;
+@group(0) @binding(8) var<storage, read> blocks: array<Block>;
 
 // 1 to trim, 0 only to count covered pixels.
 override TRIMS: u32;
@@ -38,6 +38,8 @@ var<workgroup> tails: array<u32, SQUARE * SQUARE>;
 var<workgroup> tail_count: atomic<u32>;
 // Bits of empty pixels, per row of the wide square: the first 32 columns, then the others.
 var<workgroup> empties: array<atomic<u32>, 2u * WIDE>;
+// Bits of pixels in cores, per row of the square.
+var<workgroup> cores: array<atomic<u32>, SQUARE>;
 // Bits of the middles of empty 3×3 squares, likewise.
 var<workgroup> middles: array<vec2u, WIDE>;
 // Bits of empty blocks, per row of blocks, likewise.
@@ -59,19 +61,36 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     for (var word = local; word < 2u * WIDE_BLOCKS; word += SMALL_GROUP) {
         atomicStore(&empty_blocks[word], 0u);
     }
+    if local < SQUARE {
+        atomicStore(&cores[local], 0u);
+    }
     if local < 2u * DIRECTIONS {
-        sides[local] = side(local);
+        var masks = SIDES;
+        sides[local] = masks[local];
     }
     workgroupBarrier();
     let columns = (frame.size.x + SQUARE - 1u) / SQUARE;
     let group = group_index(workgroup);
     let corner = SQUARE * vec2u(group % columns, group / columns);
-    for (var place = local; place < WIDE * WIDE; place += SMALL_GROUP) {
-        let at = vec2u(place % WIDE, place / WIDE);
-        // Unsigned wrap-around moves pixels before the first far beyond the last.
-        let pixel = corner + at - MARGIN;
-        if all(pixel < frame.size) && cover[pixel.y * frame.size.x + pixel.x].rim == EMPTY_RIM {
-            atomicOr(&empties[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
+    // The margin is a block wide.
+    const ACROSS_WIDE = WIDE / BLOCK_PX;
+    for (var place = local; place < ACROSS_WIDE * ACROSS_WIDE && TRIMS == 1u; place += SMALL_GROUP) {
+        let at = vec2u(place % ACROSS_WIDE, place / ACROSS_WIDE);
+        // Unsigned wrap-around moves blocks before the first far beyond the last.
+        let block = corner / BLOCK_PX + at - 1u;
+        if all(block < block_counts()) {
+            let rims = blocks[block.y * block_counts().x + block.x].rims;
+            let first = BLOCK_PX * at;
+            for (var row = 0u; row < BLOCK_PX; row++) {
+                let empty = (rims >> (BLOCK_PX * row)) & 15u;
+                atomicOr(&empties[2u * (first.y + row) + first.x / 32u], empty << (first.x % 32u));
+            }
+            if rims >= 0x10000u && all(at > vec2u(0u)) && all(at < vec2u(ACROSS_WIDE - 1u)) {
+                for (var row = 0u; row < BLOCK_PX; row++) {
+                    let core = (rims >> (16u + BLOCK_PX * row)) & 15u;
+                    atomicOr(&cores[first.y + row - MARGIN], core << (first.x - MARGIN));
+                }
+            }
         }
     }
     if statistics.noise.level > 0.0 {
@@ -79,7 +98,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
             let at = vec2u(place % WIDE_BLOCKS, place / WIDE_BLOCKS);
             // Unsigned wrap-around moves blocks before the first far beyond the last.
             let block = corner / BLOCK_PX + at - BLOCK_MARGIN;
-            if all(block < block_counts()) && (blocks[block.y * block_counts().x + block.x] & EMPTY_BLOCK) != 0u {
+            if all(block < block_counts()) && (blocks[block.y * block_counts().x + block.x].held & EMPTY_BLOCK) != 0u {
                 atomicOr(&empty_blocks[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
                 atomicStore(&is_any_empty, 1u);
             }
@@ -97,10 +116,9 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     for (var place = local; place < SQUARE * SQUARE; place += SMALL_GROUP) {
         let at = vec2u(place % SQUARE, place / SQUARE);
         let pixel = corner + at;
-        if all(pixel < frame.size) {
-            let rim = cover[pixel.y * frame.size.x + pixel.x].rim;
-            stay += select(1u, 0u, rim == EMPTY_RIM || beside_picture(pixel) > 0u);
-            if TRIMS == 1u && rim != EMPTY_RIM && (rim > EMPTY_RIM || is_gap(at) || blurred_by(at, pixel, abs(rim)) > 0.0) {
+        if all(pixel < frame.size) && !is_empty_at(at, pixel) {
+            stay += select(1u, 0u, beside_picture(pixel) > 0u);
+            if TRIMS == 1u && (!is_core_at(at) || is_gap(at) || is_blurred(at, pixel)) {
                 tails[atomicAdd(&tail_count, 1u)] = place;
             }
         }
@@ -134,6 +152,28 @@ fn clear(at: u32) {
     for (var plane = at; plane < arrayLength(&extras); plane += frame.size.x * frame.size.y) {
         extras[plane] = vec4f(0.0);
     }
+}
+
+// Whether a pixel of the square is empty.
+fn is_empty_at(place: vec2u, pixel: vec2u) -> bool {
+    if TRIMS == 0u {
+        return cover[pixel.y * frame.size.x + pixel.x].rim == EMPTY_RIM;
+    }
+    let row = empty_row(place.y + MARGIN);
+    return (seven_bits(place.x, row) & 8u) != 0u;
+}
+
+// Whether a pixel of the square is in a core.
+fn is_core_at(place: vec2u) -> bool {
+    return ((atomicLoad(&cores[place.y]) >> place.x) & 1u) == 1u;
+}
+
+// Whether noise may blur the border beside a pixel of the square.
+fn is_blurred(place: vec2u, pixel: vec2u) -> bool {
+    if atomicLoad(&is_any_empty) == 0u {
+        return false;
+    }
+    return blurred_by(place, pixel, abs(cover[pixel.y * frame.size.x + pixel.x].rim)) > 0.0;
 }
 
 fn empty_row(row: u32) -> vec2u {
@@ -171,19 +211,6 @@ fn across(which: u32) -> vec2i {
     var directions = ACROSS;
     let direction = directions[which % DIRECTIONS];
     return select(direction, -direction, which >= DIRECTIONS);
-}
-
-// Mask of the sixteenths within a pixel of the middle that lie ahead in a direction, or level with the middle.
-fn side(which: u32) -> vec2u {
-    let along = across(which);
-    var bits = vec2u(0u);
-    for (var bit = 0u; bit < 64u; bit++) {
-        // Offset from the pixel's middle, in eighths of a pixel.
-        let at = 2 * vec2i(vec2u(bit % 8u, bit / 8u)) - 7;
-        let is_in = at.x * at.x + at.y * at.y < 64 && at.x * along.x + at.y * along.y >= 0;
-        bits[bit / 32u] |= u32(is_in) << (bit % 32u);
-    }
-    return bits;
 }
 
 // Noise in pixels that may blur the border beside a pixel, covered by a splat of this reach. 0 if there is too little,
@@ -268,8 +295,14 @@ fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
     return mean_of_splats(pixel, select(MIN_SPLATS[0], MIN_SPLATS[1], wide));
 }
 
+// Rim of a pixel: see `rim_in`.
+fn rim_of(pixel: vec2u) -> u32 {
+    let block = pixel / BLOCK_PX;
+    return rim_in(blocks[block.y * block_counts().x + block.x], pixel);
+}
+
 fn is_empty(pixel: vec2u) -> bool {
-    return cover[pixel.y * frame.size.x + pixel.x].rim == EMPTY_RIM;
+    return (rim_of(pixel) & 1u) == 1u;
 }
 
 fn count(bits: vec2u) -> u32 {
@@ -380,9 +413,9 @@ fn meets_core(origin: vec2i, direction: vec2i, stride: i32, strides: i32) -> boo
             // Beyond the screen the surface goes on.
             return true;
         }
-        let rim = cover[u32(pixel.y) * frame.size.x + u32(pixel.x)].rim;
-        if rim <= EMPTY_RIM {
-            return rim < EMPTY_RIM;
+        let rim = rim_of(vec2u(pixel));
+        if rim != 0u {
+            return rim > 1u;
         }
     }
     return false;

@@ -126,8 +126,8 @@ fn moved(a: &ScreenPoints, b: &ScreenPoints) -> f64 {
 #[test]
 fn the_device_finds_what_the_host_finds() {
     let Some(gpu) = test_gpu() else { return };
-    let forms: Vec<bool> = [true, false].into_iter().filter(|&int64| !int64 || gpu.int64_atomics()).collect();
-    let forms: Vec<_> = forms.iter().map(|&int64| (int64, ProjectPasses::new(&gpu, int64).expect("passes"))).collect();
+    let ways = [Nearest::InLanes, Nearest::Once, Nearest::Twice].into_iter().filter(|way| way.fits(&gpu));
+    let forms: Vec<_> = ways.map(|way| (way, ProjectPasses::new(&gpu, way).expect("passes"))).collect();
     for (name, mut positions) in test_clouds::all(4000) {
         positions.extend([[f32::NAN, 0.0, 0.0], [f32::INFINITY, 1.0, 0.0], [3e38, 3e38, -3e38]]);
         let cloud = PointCloud::new(DVec3::ZERO, positions);
@@ -145,9 +145,9 @@ fn the_device_finds_what_the_host_finds() {
                 let view = camera.view(DVec3::ZERO, size).expect("a view").with_margin(margin);
                 let mut projector = Projector::default();
                 let host = projector.project(&cloud, &view, &rules, &crate::cancel::NEVER);
-                for (int64, passes) in &forms {
+                for (way, passes) in &forms {
                     let (device, sixteenths) = project(&gpu, passes, &cloud, &view, &rules);
-                    let case = format!("{name} {projection:?} {size:?} {rules:?} {int64}");
+                    let case = format!("{name} {projection:?} {size:?} {rules:?} {way:?}");
                     assert_eq!(device.dropped, host.dropped, "{case}");
                     // Divisions on a device can be off by some units in the last place, which moves a few of ten
                     // thousand points over the border of a pixel.

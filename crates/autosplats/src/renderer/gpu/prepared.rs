@@ -12,7 +12,7 @@ use crate::fit::orient::gpu::OrientPasses;
 use crate::gpu::{FrameUniform, Gpu, Step};
 use crate::points::Points;
 use crate::project::DeviceCloud;
-use crate::project::gpu::{ProjectPasses, ScreenBuffers};
+use crate::project::gpu::{Nearest, ProjectPasses, ScreenBuffers};
 use crate::renderer::attributes::SplatAttributes;
 use crate::renderer::frame::Stage;
 use crate::renderer::rules::Rules;
@@ -24,7 +24,7 @@ use crate::search::past::gpu::{PastPasses, past_buffer};
 use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::shade::gpu::{ShadeBuffers, ShadePasses, ShadeUniform, finds_range};
 use crate::shade::over_time::gpu::{LastPictureBuffers, PictureOverTimePasses};
-use crate::shade::{ColorMode, linear_steps};
+use crate::shade::{ColorMode, Scene, linear_steps};
 use crate::splat::gpu::{LayerRules, SplatBuffers, SplatPasses};
 use crate::splat::over_time::gpu::{OverTimeBuffers, OverTimePasses};
 use crate::splat::{Channels, LayerBuffers};
@@ -52,7 +52,7 @@ pub(super) struct Passes {
 impl Passes {
     pub(super) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let (project, others) = join(
-            || ProjectPasses::new(gpu, gpu.int64_atomics()),
+            || ProjectPasses::new(gpu, Nearest::best(gpu)),
             || join(|| Ok::<_, Error>((PastPasses::new(gpu)?, FitPasses::new(gpu)?)), || ShadePasses::new(gpu)),
         );
         let (past_and_fit, shade) = others;
@@ -309,7 +309,7 @@ impl Prepared {
         (view, points, format): (&View, Points<'_>, Option<wgpu::TextureFormat>),
         rules: &Rules,
         settings: &Settings,
-        shading: &ShadeUniform,
+        scene: &Scene<'_>,
     ) {
         let Settings { reconstruction, .. } = settings;
         let now = points.placed(*view);
@@ -328,7 +328,9 @@ impl Prepared {
             FrameUniform { frames_averaged, same_points, same_picture, ..frame_uniform.after(&past) }
         });
         gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&frame_uniform));
-        self.picture.write(gpu, shading, &settings.shading);
+        let shading = ShadeUniform::new(scene, &settings.shading, &self.layers, settings.all_layers);
+        let shading = format.map_or(shading, |format| shading.into_format(format));
+        self.picture.write(gpu, &shading, &settings.shading);
     }
 }
 

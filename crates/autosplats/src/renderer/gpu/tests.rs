@@ -2,7 +2,7 @@
 
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use crate::gpu::{INT64_ATOMICS, PassSource, link};
+use crate::gpu::{INT64_ATOMICS, INT64_IN_LANES, PassSource, link};
 
 mod dispatches;
 mod layouts;
@@ -30,10 +30,13 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
     stages.into_iter().flatten()
 }
 
-/// Naga's names of the features that a pass declares. Only 64-bit atomics are beyond WebGPU's core.
+/// Naga's names of the features that a pass declares. Only 64-bit atomics and subgroups are beyond WebGPU's core.
 fn capabilities(pass: &PassSource) -> Capabilities {
-    if pass.needs.contains(INT64_ATOMICS) {
-        Capabilities::SHADER_INT64 | Capabilities::SHADER_INT64_ATOMIC_MIN_MAX
+    let atomics = Capabilities::SHADER_INT64 | Capabilities::SHADER_INT64_ATOMIC_MIN_MAX;
+    if pass.needs.contains(INT64_IN_LANES) {
+        atomics | Capabilities::SHADER_INT64_ATOMIC_ALL_OPS | Capabilities::SUBGROUP
+    } else if pass.needs.contains(INT64_ATOMICS) {
+        atomics
     } else {
         Capabilities::empty()
     }

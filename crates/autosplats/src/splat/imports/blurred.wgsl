@@ -89,7 +89,7 @@ fn steps_to_empty(pixel: vec2u, ahead: vec2f, most: u32) -> u32 {
 }
 
 fn is_empty_block(block: vec2u) -> bool {
-    return (blocks[block.y * block_counts().x + block.x] & EMPTY_BLOCK) != 0u;
+    return (blocks[block.y * block_counts().x + block.x].held & EMPTY_BLOCK) != 0u;
 }
 
 // Sum of the offsets of the empty blocks within `radius` pixels of a pixel's middle; near blocks weigh most. 0 if there
@@ -138,7 +138,7 @@ fn off(points: Moments, ahead: vec2f, blur: vec2f) -> f32 {
 fn held_by(square: vec2u, side: u32) -> f32 {
     var held = 0u;
     if side == BLOCK_PX {
-        held = blocks[square.y * block_counts().x + square.x] & ~EMPTY_BLOCK;
+        held = blocks[square.y * block_counts().x + square.x].held & ~EMPTY_BLOCK;
     } else {
         let first = side * square;
         let more = min(first + side, frame.size) - first > vec2u(1u);

@@ -1,16 +1,14 @@
-// Draws the depths of a splat within its bounds: one invocation, or a team (`large`).
+// Draws the depths of a splat within its bounds: those of a row, or all by a team of invocations (`large`).
 
 #import fragment
 #import large
 #import splat
 
-fn draw_alone(splat: Splat, bounds: vec2u) {
-    for (var row = firsts(bounds).y; row <= lasts(bounds).y; row++) {
-        let line = line_of(splat, row);
-        let span = span_of(splat, line, bounds);
-        for (var column = span.x; column <= span.y; column++) {
-            draw_depth(splat, line, u32(column));
-        }
+fn draw_row(splat: Splat, bounds: vec2u, row: u32) {
+    let line = line_of(splat, row);
+    let span = span_of(splat, line, bounds);
+    for (var column = span.x; column <= span.y; column++) {
+        draw_depth(splat, line, u32(column));
     }
 }
 

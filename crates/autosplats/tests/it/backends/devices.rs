@@ -56,6 +56,26 @@ fn a_cloud_larger_than_a_binding_on_the_callers_own_device() {
     compare(&mut own, &cloud, &camera, size, &a_point_a_pixel(), "after a refusal");
 }
 
+/// Without subgroups and 64-bit atomics, and within WebGPU's default limits.
+#[test]
+fn a_device_without_features_gives_the_same_picture() {
+    let Some(mut usual) = crate::gpu() else { return };
+    let (device, queue) = own_device(128 << 20).expect("a device");
+    let mut bare = Renderer::with_device(device, queue).expect("a renderer");
+    // Hardware may fuse products and sums of one form of a pass and not of another.
+    let allowed = if usual.adapter().expect("a device").software { 0.0 } else { MAX_DIFFERENT_SHARE };
+    for (name, count) in [("statue", 60_000), ("herd", 80_000)] {
+        let (cloud, camera) = scene(name, count);
+        for settings in [Settings::default(), a_point_a_pixel()] {
+            let [usual, bare] = [&mut usual, &mut bare].map(|renderer| {
+                renderer.render(&cloud, &camera, [200, 140], &settings).expect("a picture").image.clone()
+            });
+            let different = unlike(&usual, &bare);
+            assert!(different <= allowed, "{name}: {different} of the pixels differ");
+        }
+    }
+}
+
 #[test]
 fn clouds_of_any_size_follow_each_other() {
     let Some(mut gpu) = crate::gpu() else { return };
