@@ -5,7 +5,7 @@ use std::fs::{File, create_dir_all};
 use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use autosplats_cloud::{Draft, Error, Existing, Output, PointCloud, write_whole};
+use autosplats_cloud::{Draft, Error, Existing, Output, PointCloud, is_full, write_whole};
 use autosplats_formats::check_writable;
 use autosplats_output::PictureFormat;
 
@@ -139,7 +139,11 @@ pub(crate) fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
             ErrorKind::AlreadyExists => format!("{shown}: already exists; --force replaces it"),
             ErrorKind::IsADirectory => format!("{shown}: this is a folder; name a file"),
             // The caller does not know the temporary file's name.
-            _ => format!("{shown}: cannot be written: {}", said.split(" at path ").next().unwrap_or(&said)),
+            _ => {
+                let said = said.split(" at path ").next().unwrap_or(&said);
+                let remedy = if is_full(error) { "; free some, or write to another disk" } else { "" };
+                format!("{shown}: cannot be written: {said}{remedy}")
+            }
         },
     )
 }

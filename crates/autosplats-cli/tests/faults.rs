@@ -8,10 +8,12 @@
 
 #[path = "it/common/mod.rs"]
 mod common;
+#[path = "faults/disks.rs"]
+mod disks;
 
 use std::fs;
 use std::os::unix::process::ExitStatusExt as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -239,55 +241,6 @@ fn a_file_too_large_for_its_limit_is_an_error() {
         assert_eq!(leftovers(&folder), [""; 0], "{arguments:?}");
         let first = folder.read(outputs[0]);
         assert!(first == b"old", "{arguments:?}: what was there stays");
-    }
-}
-
-/// A small file system, unmounted when dropped.
-struct Disk(PathBuf);
-
-impl Disk {
-    /// `None` where none can be mounted.
-    fn mount(folder: &Folder) -> Option<Self> {
-        let place = folder.path("disk");
-        fs::create_dir(&place).expect("a folder");
-        let mut mount = Command::new("mount");
-        mount.args(["-t", "tmpfs", "-o", "size=64k", "none"]).arg(&place).stderr(Stdio::null());
-        mount.status().is_ok_and(|status| status.success()).then_some(Self(place))
-    }
-}
-
-impl Drop for Disk {
-    fn drop(&mut self) {
-        let _ = Command::new("umount").arg(&self.0).status();
-    }
-}
-
-#[test]
-fn a_full_disk_is_an_error() {
-    let folder = with_points();
-    let Some(disk) = Disk::mount(&folder) else {
-        common::left_out("a full disk", "no file system can be mounted here");
-        return;
-    };
-    for (arguments, outputs) in jobs() {
-        let on_disk = |word: &&str| outputs.contains(word) || word.starts_with("f_");
-        let placed: Vec<String> =
-            arguments.iter().map(|word| if on_disk(word) { format!("disk/{word}") } else { (*word).into() }).collect();
-        let placed: Vec<&str> = placed.iter().map(String::as_str).collect();
-        folder.succeed(&arguments);
-        outputs.iter().for_each(|name| fs::write(disk.0.join(name), "").expect("there is room for that"));
-        let end = ended(start(&folder, &placed));
-        let errors = end.stderr.lines().filter(|line| line.starts_with("error: ")).count();
-        assert!(end.code == Some(4) && errors == 1, "{placed:?}: {end:?}");
-        for name in &outputs {
-            let found = fs::read(disk.0.join(name)).expect("it is there");
-            assert!(found.is_empty() || found == folder.read(name), "{placed:?}: {name} is neither old nor whole");
-        }
-        let names: Vec<_> = fs::read_dir(&disk.0).expect("a folder").map(|entry| entry.unwrap().file_name()).collect();
-        assert!(names.iter().all(|name| !name.to_string_lossy().starts_with('.')), "{placed:?}: {names:?}");
-        for name in names {
-            fs::remove_file(disk.0.join(name)).expect("it is ours");
-        }
     }
 }
 

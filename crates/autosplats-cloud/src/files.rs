@@ -1,6 +1,10 @@
 //! Temporary files, and bytes at places of files.
 
-use std::{fs::File, path::Path};
+use std::{
+    fs::File,
+    io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull},
+    path::Path,
+};
 
 use crate::Error;
 
@@ -10,6 +14,18 @@ use crate::Error;
 /// Those of the operating system.
 pub fn temporary_unnamed(folder: &Path) -> std::io::Result<File> {
     tempfile::tempfile_in(folder)
+}
+
+/// The error of a [temporary file](temporary_unnamed) in a folder. If its disk is full, it says what helps.
+pub fn temporary_failed(folder: &Path, source: &std::io::Error) -> Error {
+    let remedy = if is_full(source) { "; free some, or name another folder for temporary files" } else { "" };
+    let what = format!("temporary files cannot be kept there: {source}{remedy}");
+    Error::Io { path: folder.into(), source: std::io::Error::new(source.kind(), what) }
+}
+
+/// Whether there was no room for what was written.
+pub fn is_full(error: &std::io::Error) -> bool {
+    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }
 
 /// Bytes that can be written to the disk of a folder, if the system states them (not on Windows).
@@ -34,7 +50,7 @@ pub fn check_disk(folder: &Path, bytes: u64, what: &str) -> Result<(), Error> {
         "{what} takes {need} MiB of disk for a while, but only {free} MiB are free; name another folder for temporary \
          files"
     );
-    Err(Error::Io { path: folder.into(), source: std::io::Error::new(std::io::ErrorKind::StorageFull, what) })
+    Err(Error::Io { path: folder.into(), source: std::io::Error::new(StorageFull, what) })
 }
 
 /// Reads the bytes of a file from byte `at` on, whatever other threads read.

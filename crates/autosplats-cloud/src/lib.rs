@@ -64,7 +64,7 @@ pub use crs::{Crs, CrsDefinition, GeoKeys, Unit};
 pub use encoding::{Unmarked, read_text};
 pub use error::{Error, excerpt, one_line, printable, shown_number};
 pub use error_kind::ErrorKind;
-pub use files::{check_disk, free_disk, read_exact_at, temporary_unnamed, write_all_at};
+pub use files::{check_disk, free_disk, is_full, read_exact_at, temporary_failed, temporary_unnamed, write_all_at};
 pub use filter::{LeftOut, PointFilter};
 pub use geographic::{LocalMetres, looks_like_degrees};
 /// Vector library of the public interface.

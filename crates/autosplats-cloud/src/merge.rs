@@ -22,8 +22,8 @@ impl PointCloud {
     ///   Parts without poses that share one origin keep that origin and their exact positions.
     /// * If any part has colours, the points of the others become grey.
     /// * A field is kept if every part [knows](Self::knows) it; it is zero where a reader left it out for being zero.
-    ///   Fields of different types become `f64`. Normals of floats are rotated with their points and keep their lengths;
-    ///   other fields stay unchanged.
+    ///   Case matters. Fields of different types become `f64`. Normals of floats are rotated with their points and keep
+    ///   their lengths; other fields stay unchanged.
     /// * Axes are kept if all parts that state axes agree. Coordinate system and resolution are kept if all parts
     ///   agree.
     /// * Scans are kept, each moved with its part.

@@ -17,7 +17,7 @@ use std::{
 
 use crate::{
     Error,
-    files::{read_exact_at, temporary_unnamed, write_all_at},
+    files::{read_exact_at, temporary_failed, temporary_unnamed, write_all_at},
 };
 
 /// Bytes of a slot: large ones are read fast, small ones let many cells gather records.
@@ -85,15 +85,14 @@ impl Spill {
     pub fn new(folder: &Path, record_len: usize, cells: usize, budget: usize) -> Result<Self, Error> {
         let wished = (budget / cells.max(1)).clamp(SMALLEST_SLOT, LARGEST_SLOT);
         let slot = (wished / record_len).max(1) * record_len;
-        let file = temporary_unnamed(folder).map_err(|source| Error::Io { path: folder.into(), source })?;
+        let file = temporary_unnamed(folder).map_err(|source| temporary_failed(folder, &source))?;
         let (gathered, slots) = (AtomicUsize::new(0), Mutex::default());
         let (stored, most) = (AtomicU64::new(0), AtomicU64::new(0));
         Ok(Self { folder: folder.into(), file, record_len, slot, budget, gathered, slots, stored, most })
     }
 
     fn io(&self, source: std::io::Error) -> Error {
-        let source = std::io::Error::new(source.kind(), format!("temporary records: {source}"));
-        Error::Io { path: self.folder.clone(), source }
+        temporary_failed(&self.folder, &source)
     }
 
     /// Adds records to one of the cells, from any thread.

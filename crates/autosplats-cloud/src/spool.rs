@@ -7,7 +7,7 @@ use std::{
 
 use crate::{
     Clouds, Crs, Error, Field, PointCloud, Progress, Scan, each_type,
-    files::{read_exact_at, temporary_unnamed, write_all_at},
+    files::{read_exact_at, temporary_failed, temporary_unnamed, write_all_at},
 };
 
 /// Points of [`Clouds`], kept in a temporary file without a name, so that nothing is left whatever ends the program.
@@ -51,7 +51,7 @@ impl Spool {
     /// Those of reading and of the operating system; [`Error::Unsupported`] if parts have unlike fields; and
     /// [`Error::Cancelled`] if `progress` says so.
     pub fn of(clouds: &dyn Clouds, folder: &Path, progress: &dyn Progress) -> Result<Self, Error> {
-        let file = temporary_unnamed(folder).map_err(|source| Error::Io { path: folder.into(), source })?;
+        let file = temporary_unnamed(folder).map_err(|source| temporary_failed(folder, &source))?;
         let mut spool = Self {
             name: clouds.name().into(),
             folder: folder.into(),
@@ -109,20 +109,15 @@ impl Spool {
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        write_all_at(&self.file, bytes, self.bytes).map_err(|source| self.failed(source))?;
+        write_all_at(&self.file, bytes, self.bytes).map_err(|source| temporary_failed(&self.folder, &source))?;
         self.bytes += bytes.len() as u64;
         Ok(())
     }
 
     fn get(&self, at: &mut u64, bytes: &mut [u8]) -> Result<(), Error> {
-        read_exact_at(&self.file, bytes, *at).map_err(|source| self.failed(source))?;
+        read_exact_at(&self.file, bytes, *at).map_err(|source| temporary_failed(&self.folder, &source))?;
         *at += bytes.len() as u64;
         Ok(())
-    }
-
-    fn failed(&self, source: std::io::Error) -> Error {
-        let source = std::io::Error::new(source.kind(), format!("temporary points: {source}"));
-        Error::Io { path: self.folder.clone(), source }
     }
 
     fn part(&self, stored: &Stored) -> Result<PointCloud, Error> {

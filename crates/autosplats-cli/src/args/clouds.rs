@@ -26,8 +26,8 @@ Examples:
   autosplats convert city.copc.laz thin.laz --voxel 0.1 --memory 1G
 
 A name that ends in .copc.laz makes an octree. About as much disk as the uncompressed points take is used for a while.
-LAS, LAZ, COPC, PLY, PCD, E57, text and scenes may be larger than memory. Meshes, compressed PCD, what gzip compressed
-and other formats are read whole, one at a time.";
+LAS, LAZ, COPC, PLY, PCD, E57, text and scenes may be larger than memory: they are worked on in parts. Meshes,
+compressed PCD, what gzip compressed and other formats are read whole.";
 
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_EXAMPLES, override_usage = "autosplats convert [OPTIONS] <INPUT>... <OUT>")]
@@ -57,9 +57,9 @@ pub(crate) struct ConvertArgs {
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Running")]
 pub(crate) struct RoomArgs {
-    /// Memory for points, such as 500M. One file or scene with more points is worked on in parts; meshes, compressed
-    /// PCD and what gzip compressed are read whole [default: three quarters of what is free; for octrees one quarter,
-    /// at most 2G]
+    /// Memory for points, such as 500M. More points are worked on in parts if all inputs are LAS, LAZ, COPC, PLY, PCD,
+    /// E57, text or scenes; others are read whole [default: three quarters of what is free; for octrees one quarter, at
+    /// most 2G]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,
     /// Folder for temporary files of work in parts [default: that of the output, or the system's]
@@ -118,7 +118,10 @@ Examples:
 The file keeps all attributes of the input and adds:
   NormalX NormalY NormalZ  unit normal (nx ny nz in PLY)
   Curvature                surface variation, from 0 (flat) to 1/3 (no direction is special)
-  DensityRadius            twice the radius of the circle that each neighbour covers on average, in the input's units";
+  DensityRadius            twice the radius of the circle that each neighbour covers on average, in the input's units
+
+LAS, LAZ, COPC, PLY, PCD, E57, text and scenes may be larger than memory: they are worked on in parts. Other inputs are
+read whole.";
 
 #[derive(Args, Debug)]
 #[command(after_help = NORMALS_EXAMPLES, override_usage = "autosplats normals [OPTIONS] <INPUT>... <OUT>")]

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 use std::sync::OnceLock;
+use std::time::SystemTime;
 
 use autosplats_cloud::glam::DMat4;
 use autosplats_cloud::{Clouds, Error, Merged, Outline, Part, PointCloud, Progress};
@@ -115,12 +116,12 @@ fn streamed(input: &Input) -> TreeInput<'_> {
     match &input.source {
         Source::File(path) if plain && is_las(path) => TreeInput::Las(path.clone()),
         Source::File(path) if plain && !input.moves() => {
-            TreeInput::Clouds(Box::new(FileClouds { input, path, parts: OnceLock::new() }))
+            TreeInput::Clouds(Box::new(FileClouds { whole: Whole::new(input), path, parts: OnceLock::new() }))
         }
         Source::Scene(scene, count) if plain && !input.moves() => {
             TreeInput::Clouds(Box::new(SceneClouds { name: &input.name, scene, count: *count }))
         }
-        _ => TreeInput::Clouds(Box::new(Whole(input))),
+        _ => TreeInput::Clouds(Box::new(Whole::new(input))),
     }
 }
 
@@ -135,7 +136,7 @@ const SETTLING: f32 = 0.5;
 
 /// A file that is read in parts if its format allows it.
 struct FileClouds<'a> {
-    input: &'a Input,
+    whole: Whole<'a>,
     path: &'a Path,
     /// Set once the file is opened: `None` if it is read whole.
     parts: OnceLock<Option<Parts>>,
@@ -143,7 +144,7 @@ struct FileClouds<'a> {
 
 impl Clouds for FileClouds<'_> {
     fn name(&self) -> &Path {
-        Path::new(&self.input.name)
+        self.whole.name()
     }
 
     fn read(
@@ -156,24 +157,52 @@ impl Clouds for FileClouds<'_> {
             Some(parts) => parts,
             None => {
                 let settling = Part { whole: progress, start, len: SETTLING };
-                let parts = open_parts(self.path, &self.input.options, &settling)?;
+                let parts = open_parts(self.path, &self.whole.input.options, &settling)?;
                 start = if parts.is_some() { SETTLING } else { 0.0 };
                 self.parts.get_or_init(|| parts)
             }
         };
         match parts {
             Some(parts) => Clouds::read(parts, &Part { whole: progress, start, len: 1.0 - start }, take),
-            None => Whole(self.input).read(progress, take),
+            None => self.whole.read(progress, take),
         }
     }
 }
 
 /// An input that is read whole.
-struct Whole<'a>(&'a Input);
+struct Whole<'a> {
+    input: &'a Input,
+    /// Size and time of the last change of the file, as read first.
+    stamp: OnceLock<Stamp>,
+}
+
+/// Size and time of the last change, if the input is a file.
+type Stamp = Option<(u64, Option<SystemTime>)>;
+
+impl<'a> Whole<'a> {
+    fn new(input: &'a Input) -> Self {
+        Self { input, stamp: OnceLock::new() }
+    }
+
+    fn stamp(&self) -> Stamp {
+        let metadata = self.input.source.path().filter(|path| path.is_file())?.metadata().ok()?;
+        Some((metadata.len(), metadata.modified().ok()))
+    }
+
+    /// Fails if the file is not as it was.
+    fn check(&self) -> Result<(), Error> {
+        let now = self.stamp();
+        if *self.stamp.get_or_init(|| now) == now {
+            return Ok(());
+        }
+        let what = "the file changed while it was read; start again";
+        Err(Error::malformed(self.name(), "size or time", what))
+    }
+}
 
 impl Clouds for Whole<'_> {
     fn name(&self) -> &Path {
-        Path::new(&self.0.name)
+        Path::new(&self.input.name)
     }
 
     fn read(
@@ -181,8 +210,10 @@ impl Clouds for Whole<'_> {
         progress: &dyn Progress,
         take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let cloud = read_whole(self.0, progress)?;
-        let pose = self.0.world_from_input;
+        self.check()?;
+        let cloud = read_whole(self.input, progress)?;
+        self.check()?;
+        let pose = self.input.world_from_input;
         if pose == DMat4::IDENTITY { take(&cloud) } else { take(&PointCloud::merge(vec![(cloud, pose)])) }
     }
 }

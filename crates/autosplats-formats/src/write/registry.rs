@@ -47,7 +47,7 @@ pub fn write<'a>(cloud: &PointCloud, output: impl Into<Output<'a>>, progress: &d
     write_clouds(&Held { name: output.path, cloud }, output, progress)
 }
 
-/// Like [`write()`], of points that come in parts. They are read two to six times, and memory needs to hold only a
+/// Like [`write()`], of points that come in parts. They are read two to seven times, and memory needs to hold only a
 /// part of them. The file has the same bytes as if all came at once.
 ///
 /// # Errors

@@ -16,8 +16,8 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Clouds, Part, PointCloud, Progress, Spill, SpillCell, Tile, Tiles, lock, read_exact_at, temporary_unnamed,
-    write_all_at,
+    Clouds, Part, PointCloud, Progress, Spill, SpillCell, Tile, Tiles, lock, read_exact_at, temporary_failed,
+    temporary_unnamed, write_all_at,
 };
 use rayon::prelude::*;
 
@@ -268,7 +268,7 @@ fn collect(
     points: u64,
     progress: &dyn Progress,
 ) -> Result<File, Error> {
-    let io = |source| autosplats_cloud::Error::Io { path: folder.into(), source };
+    let io = |source| temporary_failed(folder, &source);
     let file = temporary_unnamed(folder).map_err(io)?;
     let nan = f32::NAN.to_le_bytes().repeat(RESULT / 4);
     for (run, cell) in cells.into_iter().enumerate() {
@@ -328,7 +328,7 @@ impl NormalsInParts {
         let count = (points.end - points.start) as usize;
         let mut values = vec![[0.0_f32; RESULT / 4]; count];
         read_exact_at(&self.file, bytemuck::cast_slice_mut(&mut values), points.start * RESULT as u64)
-            .map_err(|source| autosplats_cloud::Error::Io { path: self.folder.clone(), source })?;
+            .map_err(|source| temporary_failed(&self.folder, &source))?;
         Ok(Normals {
             normals: values.iter().map(|&[x, y, z, ..]| [x, y, z]).collect(),
             curvature: values.iter().map(|values| values[3]).collect(),

@@ -8,6 +8,7 @@
 
 use std::{
     fs::File,
+    io::ErrorKind,
     ops::Range,
     path::{Path, PathBuf},
     time::SystemTime,
@@ -207,7 +208,8 @@ impl Stream {
             map.get(run.bytes.start as usize..run.bytes.end as usize).ok_or_else(changed)?
         } else {
             packed.resize(len as usize, 0);
-            read_exact_at(&file, packed, run.bytes.start).map_err(io)?;
+            read_exact_at(&file, packed, run.bytes.start)
+                .map_err(|source| if source.kind() == ErrorKind::UnexpectedEof { changed() } else { io(source) })?;
             packed
         };
         let lost = match &self.layout {

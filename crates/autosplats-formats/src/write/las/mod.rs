@@ -57,7 +57,12 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>, compressed: bool) -> Re
         Some(vlr) => {
             let mut compressor = ParLasZipCompressor::new(&mut *file, vlr).map_err(|error| failed(job, &error))?;
             let batch = CHUNK * rayon::current_num_threads().max(4);
-            encoder.encode(batch, |records| compressor.compress_many(records).map_err(io))?;
+            // The compressor wraps errors of the operating system twice.
+            let unwrapped = |error: std::io::Error| match error.downcast::<laz::LasZipError>() {
+                Ok(error) => failed(job, &error),
+                Err(source) => job.io(source),
+            };
+            encoder.encode(batch, |records| compressor.compress_many(records).map_err(unwrapped))?;
             compressor.done().map_err(|error| failed(job, &error))?;
         }
         None => encoder.encode(CHUNK * 4, |records| file.write_all(records).map_err(io))?,
@@ -94,7 +99,11 @@ fn failed(job: &Job<'_>, error: &laz::LasZipError) -> Error {
 
 /// The error of the compressor, which is one of the operating system.
 pub(super) fn failed_packing(path: &Path, error: &laz::LasZipError) -> Error {
-    Error::Io { path: path.into(), source: std::io::Error::other(error.to_string()) }
+    let source = match error {
+        laz::LasZipError::IoError(source) => std::io::Error::new(source.kind(), source.to_string()),
+        error => std::io::Error::other(error.to_string()),
+    };
+    Error::Io { path: path.into(), source }
 }
 
 /// Makes records of points.
