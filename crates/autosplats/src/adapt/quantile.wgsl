@@ -18,8 +18,10 @@ var<workgroup> thin: array<atomic<u32>, 2>;
 // For each of the first sizes: the whole sample's thin balls with a fitted next ball, and the steady ones of them.
 var<workgroup> pairs: array<atomic<u32>, STEADY_SCALES>;
 var<workgroup> steady: array<atomic<u32>, STEADY_SCALES>;
-// Number of values below the candidate of each bit.
-var<workgroup> below: array<atomic<u32>, 32>;
+// Rounds of three bits each in which the quantile is found, the first of a single bit, as values have 31.
+const ROUNDS = 11u;
+// For each round, the numbers of values below the candidates 1 to 8, two to a word.
+var<workgroup> below: array<atomic<u32>, 4u * ROUNDS>;
 
 // Steady share of a size; below 0 if too few balls are thin.
 fn steady_share(size: u32) -> f32 {
@@ -40,7 +42,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         atomicStore(&fitted[local], 0u);
         atomicStore(&thin[local], 0u);
     }
-    if local < 32u {
+    if local < 4u * ROUNDS {
         atomicStore(&below[local], 0u);
     }
     if local < STEADY_SCALES {
@@ -91,19 +93,31 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let differs = saturate((first_steady - UNEVEN_NOISE_SHARES[0]) * (1.0 / (UNEVEN_NOISE_SHARES[1] - UNEVEN_NOISE_SHARES[0])));
     let raised = select(0.0, differs * (UNEVEN_NOISE_QUANTILE - NOISE_QUANTILE), is_asked && scale == 0u);
     let at = u32((NOISE_QUANTILE + raised) * f32(select(all_fitted, all_thin, is_thin)));
-    // The largest value with at most `at` values below it, found bit by bit.
+    // The largest value with at most `at` values below it, found three bits at a time.
     var found = 0u;
-    for (var bit = 31u; bit > 0u; bit--) {
-        let tried = found | (1u << (bit - 1u));
-        var own = 0u;
+    for (var round = 0u; round < ROUNDS; round++) {
+        let shift = 3u * (ROUNDS - 1u - round);
+        var own = vec4u(0u);
         for (var index = local; index < len; index += SMALL_GROUP) {
             let bits = scatters[first + index];
-            let counts = bits != TOO_FEW && (bits < THICK || !is_thin);
-            own += select(0u, 1u, counts && (bits & ~THICK) < tried);
+            if bits != TOO_FEW && (bits < THICK || !is_thin) {
+                let value = bits & ~THICK;
+                // The value lies below all greater candidates.
+                let candidate = select(0u, min((value - found) >> shift, 8u), value >= found);
+                own += select(vec4u(0u), vec4u(1u), vec4u(candidate) < vec4u(1u, 3u, 5u, 7u));
+                own += select(vec4u(0u), vec4u(0x10000u), vec4u(candidate) < vec4u(2u, 4u, 6u, 8u));
+            }
         }
-        atomicAdd(&below[bit], own);
+        for (var word = 0u; word < 4u; word++) {
+            atomicAdd(&below[4u * round + word], own[word]);
+        }
         workgroupBarrier();
-        found = select(found, tried, atomicLoad(&below[bit]) <= at);
+        var next = 0u;
+        for (var candidate = 1u; candidate <= min(7u, (THICK - 1u - found) >> shift); candidate++) {
+            let word = atomicLoad(&below[4u * round + (candidate - 1u) / 2u]);
+            next = select(next, candidate, ((word >> (16u * ((candidate - 1u) % 2u))) & 0xffffu) <= at);
+        }
+        found |= next << shift;
     }
     let is_noise = saturate((most_steady - NOISE_SHARES[0]) * (1.0 / (NOISE_SHARES[1] - NOISE_SHARES[0])));
     if is_asked && scale < STEADY_SCALES && most_steady >= 0.0 {

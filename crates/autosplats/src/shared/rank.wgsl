@@ -2,9 +2,13 @@
 // flags are the bits of a few words.
 
 const RANK_WORDS = RANK_BLOCK_FLAGS / 32u;
+// Words that one invocation adds up.
+const RANK_RUN = 8u;
+const RANK_RUNS = RANK_WORDS / RANK_RUN;
 
 var<workgroup> rank_bits: array<atomic<u32>, RANK_WORDS>;
-// Number of set flags before each word.
+// Number of set flags in each run of words, and before each word.
+var<workgroup> rank_runs: array<u32, RANK_RUNS>;
 var<workgroup> rank_before: array<u32, RANK_WORDS>;
 
 // To be called by all invocations before any flag is set; ends with a barrier.
@@ -22,9 +26,20 @@ fn rank_set(flag: u32) {
 // To be called by all invocations after all flags are set; begins and ends with a barrier.
 fn rank_finish(local: u32) {
     workgroupBarrier();
+    if local < RANK_RUNS {
+        var sum = 0u;
+        for (var word = 0u; word < RANK_RUN; word++) {
+            sum += countOneBits(atomicLoad(&rank_bits[RANK_RUN * local + word]));
+        }
+        rank_runs[local] = sum;
+    }
+    workgroupBarrier();
     if local < RANK_WORDS {
         var sum = 0u;
-        for (var word = 0u; word < local; word++) {
+        for (var run = 0u; run < local / RANK_RUN; run++) {
+            sum += rank_runs[run];
+        }
+        for (var word = local - local % RANK_RUN; word < local; word++) {
             sum += countOneBits(atomicLoad(&rank_bits[word]));
         }
         rank_before[local] = sum;

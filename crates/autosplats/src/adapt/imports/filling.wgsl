@@ -85,7 +85,11 @@ fn finish(cell: u32) {
     for (var index = 0u; index < used; index++) {
         clusters[cluster_at(cell, index)] = vec4f(sums[index].xyz / sums[index].w, sums[index].w);
     }
+    // Clusters of the last frame. Behind an empty one all are empty, so most cells are written little.
     for (var index = used; index < SLABS; index++) {
+        if clusters[cluster_at(cell, index)].w == 0.0 {
+            break;
+        }
         clusters[cluster_at(cell, index)] = vec4f(0.0);
     }
 }
