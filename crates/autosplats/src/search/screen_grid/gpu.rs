@@ -1,4 +1,7 @@
-//! The screen-grid search on the GPU: one invocation per point, or per four points for larger k.
+//! The screen-grid search on the GPU: an invocation per point, or per four points for larger k. Points whose search
+//! reads much are left to workgroups.
+
+use std::iter::once;
 
 use super::cpu;
 use crate::Error;
@@ -9,12 +12,13 @@ use crate::search::{self, past};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
-    files: &[IMPORTS, files!["nearest", "past", "search_task", "window_points"]],
+    files: &[IMPORTS, files!["find", "nearest", "past", "search_task", "window_points"]],
     constants: &[
         Counter::CONSTANTS,
         constants!(in cpu: FIRST_WINDOW_SLACK, MIN_RADIUS_GROWTH),
         constants!(in past: PAST_FIRST_RADII_RANGE, PAST_RADIUS_SLACK),
         constants!(in search: BOUND_STEP, MARGIN_PX, MAX_CANDIDATES, MIN_CROWDED_CANDIDATES, OUTLIER_RADIUS_SLACK),
+        constants![TOGETHER_GROUPS],
     ],
 };
 
@@ -22,10 +26,38 @@ passes! {
     "search/screen_grid", LIBRARY;
     SEARCH = "search",
     SEARCH_FOUR = "search_four",
+    SEARCH_TOGETHER = "search_together",
 }
 
 /// Least k for which four points are searched at a time. See docs/decisions/0015-search-engines.md.
 const MIN_K_FOUR_AT_A_TIME: u32 = 11;
+
+/// Workgroups that search together, a query at a time.
+const TOGETHER_GROUPS: u32 = 1024;
+/// Strips, and half the points, that an invocation reads for a query before it leaves the query to a workgroup.
+const ROUNDS_ALONE: u32 = 128;
+
+/// How the queries are divided among invocations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    /// An invocation a query.
+    One,
+    /// An invocation a query, and a workgroup for each of those that read many points.
+    OneOrMany,
+    /// An invocation four queries, then one for each that is left.
+    Four,
+}
+
+impl Form {
+    /// Software gains nothing from more invocations.
+    fn best(gpu: &Gpu, k: u32) -> Self {
+        match k {
+            MIN_K_FOUR_AT_A_TIME.. => Self::Four,
+            _ if gpu.is_software() => Self::One,
+            _ => Self::OneOrMany,
+        }
+    }
+}
 
 /// `Neighborhood` of `shared/neighborhood.wgsl`.
 type Neighborhood = [f32; 12];
@@ -54,15 +86,23 @@ struct RoundPasses {
     /// Searches four queries at a time, if k is large enough, and leaves some queries to `one`.
     four: Option<Pass>,
     one: Pass,
+    /// Searches the queries that `one` leaves.
+    together: Option<Pass>,
 }
 
 impl RoundPasses {
-    fn new(gpu: &Gpu, k: u32, four: bool, round: Round) -> Result<Self, Error> {
+    fn new(gpu: &Gpu, k: u32, form: Form, round: Round) -> Result<Self, Error> {
         let common = [round.constant(), ("K", k.into())];
-        let left_only = ("LEFT_ONLY", f64::from(u8::from(four)));
+        let left_only = ("LEFT_ONLY", f64::from(u8::from(form == Form::Four)));
+        let most_rounds = |rounds: u32| ("MOST_ROUNDS", rounds.into());
+        let alone = most_rounds(if form == Form::OneOrMany { ROUNDS_ALONE } else { u32::MAX });
+        let pass = |of: Form, source, constants: &[_]| {
+            if of == form { Pass::new(gpu, source, &[&common, constants].concat()).map(Some) } else { Ok(None) }
+        };
         Ok(Self {
-            four: if four { Some(Pass::new(gpu, &SEARCH_FOUR, &common)?) } else { None },
-            one: Pass::new(gpu, &SEARCH, &[&common[..], &[left_only]].concat())?,
+            four: pass(Form::Four, &SEARCH_FOUR, &[])?,
+            one: Pass::new(gpu, &SEARCH, &[&common[..], &[alone, left_only]].concat())?,
+            together: pass(Form::OneOrMany, &SEARCH_TOGETHER, &[most_rounds(u32::MAX)])?,
         })
     }
 }
@@ -73,11 +113,11 @@ impl SearchPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu, k: u32) -> Result<Self, Error> {
-        Self::with_form(gpu, k, k >= MIN_K_FOUR_AT_A_TIME)
+        Self::with_form(gpu, k, Form::best(gpu, k))
     }
 
-    fn with_form(gpu: &Gpu, k: u32, four: bool) -> Result<Self, Error> {
-        let round = |round: Round| RoundPasses::new(gpu, k, four, round);
+    fn with_form(gpu: &Gpu, k: u32, form: Form) -> Result<Self, Error> {
+        let round = |round: Round| RoundPasses::new(gpu, k, form, round);
         let (active, recovered) = rayon::join(|| round(Round::Active), || round(Round::Recovered));
         Ok(Self { rounds: [active?, recovered?], work: WorkPass::new(gpu)? })
     }
@@ -94,14 +134,17 @@ impl SearchPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, cell_start, points, queries, left, .. } = screen;
         let buffers = [frame, counters, density, cell_start, points, queries, neighborhoods, left, past];
-        let RoundPasses { four, one } = &self.rounds[round as usize];
+        let RoundPasses { four, one, together } = &self.rounds[round as usize];
         match four {
             Some(four) => vec![
                 four.step(gpu, &buffers, screen.groups(round.work_256())),
                 self.work.step(gpu, frame, screen),
                 one.step(gpu, &buffers, screen.groups(round.left_64())),
             ],
-            None => vec![one.step(gpu, &buffers, screen.groups(round.work_64()))],
+            None => {
+                let together = together.iter().map(|pass| pass.step(gpu, &buffers, TOGETHER_GROUPS));
+                once(one.step(gpu, &buffers, screen.groups(round.work_64()))).chain(together).collect()
+            }
         }
     }
 }

@@ -109,10 +109,10 @@ pub(crate) fn cameras() -> [Camera; 2] {
     [camera(Projection::PerspectiveFovDeg(30.0)), camera(Projection::OrthographicHeight(2.1))]
 }
 
-/// Both forms of the passes, whichever suits this k.
-fn forms(gpu: &Gpu, k: u32) -> [(&'static str, SearchPasses); 2] {
-    [("one by one", false), ("four at a time", true)]
-        .map(|(name, four)| (name, SearchPasses::with_form(gpu, k, four).expect("passes")))
+/// All forms of the passes, whichever suits this k.
+fn forms(gpu: &Gpu, k: u32) -> [(&'static str, SearchPasses); 3] {
+    [("one by one", Form::One), ("by many", Form::OneOrMany), ("four at a time", Form::Four)]
+        .map(|(name, form)| (name, SearchPasses::with_form(gpu, k, form).expect("passes")))
 }
 
 fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
