@@ -2,14 +2,11 @@
 
 use std::ops::Range;
 
-use autosplats_cloud::{Error, PointCloud, Scan, add_scans};
+use autosplats_cloud::{Error, FieldValues, PointCloud, Scan, add_scans};
 use glam::{DMat3, DMat4, DVec3};
 use rayon::prelude::*;
 
-use super::{
-    super::{Job, facts::Facts},
-    values::{Frame, beyond, returns},
-};
+use super::super::{Job, facts::Facts};
 
 /// Facts about all points.
 pub(super) struct CloudFacts {
@@ -77,6 +74,43 @@ impl CloudFacts {
 
 pub(super) fn is_finite(position: &[f32; 3]) -> bool {
     position.iter().all(|along| along.is_finite())
+}
+
+/// Whether some integers exceed 63 bits.
+fn beyond(values: &FieldValues) -> bool {
+    matches!(values, FieldValues::U64(values) if values.iter().any(|&value| i64::try_from(value).is_err()))
+}
+
+/// The values of the field of this name.
+pub(super) fn named<'a>(cloud: &'a PointCloud, name: &str) -> Option<&'a FieldValues> {
+    cloud.fields().iter().find(|field| field.name == name).map(|field| &field.values)
+}
+
+/// Whether returns are counted from 1, as they should be, so that E57's own elements can hold them.
+fn returns(cloud: &PointCloud) -> bool {
+    let whole = |values: &&FieldValues| !matches!(values, FieldValues::F32(_) | FieldValues::F64(_)) && !beyond(values);
+    let number = named(cloud, "ReturnNumber").filter(whole);
+    let counts = named(cloud, "NumberOfReturns").filter(whole);
+    counts.is_some() && number.is_some_and(|number| (0..number.len()).all(|i| number.get(i) >= 1.0))
+}
+
+/// Pose of a scan: rotation and translation from the scan's frame to the world.
+#[derive(Clone, Copy)]
+pub(super) struct Frame {
+    pub(super) rotation: DMat3,
+    pub(super) translation: DVec3,
+}
+
+impl Frame {
+    pub(super) const WORLD: Self = Self { rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
+
+    pub(super) fn is_world(self) -> bool {
+        self.rotation == DMat3::IDENTITY && self.translation == DVec3::ZERO
+    }
+
+    pub(super) fn local(self, world: DVec3) -> DVec3 {
+        if self.is_world() { world } else { self.rotation.transpose() * (world - self.translation) }
+    }
 }
 
 /// Points that make a scan.

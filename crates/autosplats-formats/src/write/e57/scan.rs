@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::{
     super::Job,
-    facts::{CloudFacts, Run, Runs},
+    facts::{CloudFacts, Frame, Run, Runs},
     pages::Pages,
-    values::{Frame, Value, values},
+    values::{Value, values},
     xml::ScanEntry,
 };
 

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 
 use super::{
     super::colors::channels,
-    facts::{CloudFacts, is_finite},
+    facts::{CloudFacts, Frame, is_finite, named},
 };
 
 /// One value of each point: name and source.
@@ -38,25 +38,6 @@ pub(super) enum Source<'a> {
         /// Whether to store 32-bit floats; possible if nothing is rotated.
         single: bool,
     },
-}
-
-/// Pose of a scan: rotation and translation from the scan's frame to the world.
-#[derive(Clone, Copy)]
-pub(super) struct Frame {
-    pub(super) rotation: DMat3,
-    pub(super) translation: DVec3,
-}
-
-impl Frame {
-    pub(super) const WORLD: Self = Self { rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
-
-    pub(super) fn is_world(self) -> bool {
-        self.rotation == DMat3::IDENTITY && self.translation == DVec3::ZERO
-    }
-
-    pub(super) fn local(self, world: DVec3) -> DVec3 {
-        if self.is_world() { world } else { self.rotation.transpose() * (world - self.translation) }
-    }
 }
 
 impl Source<'_> {
@@ -233,23 +214,6 @@ pub(super) fn values<'a>(
         }
     }
     all
-}
-
-/// Whether some integers exceed 63 bits.
-pub(super) fn beyond(values: &FieldValues) -> bool {
-    matches!(values, FieldValues::U64(values) if values.iter().any(|&value| i64::try_from(value).is_err()))
-}
-
-fn named<'a>(cloud: &'a PointCloud, name: &str) -> Option<&'a FieldValues> {
-    cloud.fields().iter().find(|field| field.name == name).map(|field| &field.values)
-}
-
-/// Whether returns are counted from 1, as they should be, so that E57's own elements can hold them.
-pub(super) fn returns(cloud: &PointCloud) -> bool {
-    let whole = |values: &&FieldValues| !matches!(values, FieldValues::F32(_) | FieldValues::F64(_)) && !beyond(values);
-    let number = named(cloud, "ReturnNumber").filter(whole);
-    let counts = named(cloud, "NumberOfReturns").filter(whole);
-    counts.is_some() && number.is_some_and(|number| (0..number.len()).all(|i| number.get(i) >= 1.0))
 }
 
 /// Replaces characters that an XML name must not have.
