@@ -142,13 +142,16 @@ impl Columns {
         }
         let full = rgb.into_iter().flatten().filter(|column| exact && column.scalar.size() > 1);
         let needs = |column: &&Column| shape.wanted.is_none_or(|wanted| wanted.needs(&column.name));
+        let mut zeros = Vec::new();
         for column in self.others.iter().filter(needs).chain(full) {
             let values = values(records, self.stride, column);
             if (0..values.len()).any(|index| values.get(index) != 0.0) {
                 cloud = cloud.with_field(&column.name, values)?;
+            } else {
+                zeros.push(&*column.name);
             }
         }
-        Ok(Decoded { cloud, levels, lost: 0 })
+        Ok(Decoded { cloud: cloud.with_zeros(zeros), levels, lost: 0 })
     }
 }
 
