@@ -44,7 +44,8 @@ use clap::Parser;
 use crate::mutate::{mutate, repair_pages};
 use crate::seeds::{Seeds, add_corpus, all};
 
-/// Limit of the processor's time for an input: far more than a sound reader needs, far less than it takes to follow a false count.
+/// Limit of the processor's time for an input: far more than a sound reader needs, far less than it takes to follow a
+/// false count.
 const TIME: Duration = Duration::from_secs(2);
 
 /// Memory limit per byte of a file, in bytes, beyond `MEMORY`. Compression can put many points into a byte.

@@ -63,7 +63,7 @@ fn time() -> Duration {
     START.get_or_init(std::time::Instant::now).elapsed()
 }
 
-/// Runs `work`. Returns its result, its time, and the peak of allocated bytes beyond those at the start, of all threads.
+/// Runs `work`. Returns its result, its time, and the peak of allocated bytes of all threads beyond those at the start.
 pub(crate) fn measured<T>(work: impl FnOnce() -> T) -> (T, Duration, usize) {
     let before = NOW.load(Relaxed);
     PEAK.store(before, Relaxed);
