@@ -184,6 +184,9 @@ pub(super) struct Runs {
     pub(super) outside: Option<usize>,
 }
 
+/// Gets a cloud, points of it, and the number of their scan.
+type Take<'a> = dyn FnMut(&PointCloud, Range<usize>, usize) -> Result<(), Error> + 'a;
+
 impl Runs {
     /// Divides the points, and reads them for what they hold.
     pub(super) fn of(job: &Job<'_>, known: &CloudFacts) -> Result<Self, Error> {
@@ -242,12 +245,8 @@ impl Runs {
         Self { runs, pieces, outside }
     }
 
-    /// Passes on all points in the cloud's order: clouds, points of them, and the number of their scan.
-    pub(super) fn each(
-        &self,
-        job: &Job<'_>,
-        take: &mut dyn FnMut(&PointCloud, Range<usize>, usize) -> Result<(), Error>,
-    ) -> Result<(), Error> {
+    /// Passes on all points in the cloud's order.
+    pub(super) fn each(&self, job: &Job<'_>, take: &mut Take<'_>) -> Result<(), Error> {
         let mut before = 0;
         job.each(&mut |cloud| {
             let end = before + cloud.len();

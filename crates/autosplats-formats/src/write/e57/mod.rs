@@ -58,8 +58,11 @@ fn write_metres(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Er
     pages.finish(&xml).map_err(|source| job.io(source))
 }
 
+/// Changes points.
+type Change = Box<dyn Fn(&mut PointCloud) + Sync + Send>;
+
 /// What brings the points to metres, if they state another unit.
-fn in_metres(job: &Job<'_>) -> Result<Option<Box<dyn Fn(&mut PointCloud) + Sync + Send>>, Error> {
+fn in_metres(job: &Job<'_>) -> Result<Option<Change>, Error> {
     let Facts { like, points, .. } = Facts::of(job)?;
     let crs = like.crs();
     let Some(unit) = crs.unit else { return Ok(None) };
@@ -67,7 +70,7 @@ fn in_metres(job: &Job<'_>) -> Result<Option<Box<dyn Fn(&mut PointCloud) + Sync 
     if scale == Some(DVec3::ONE) || scale.is_none() && unit != Unit::Degree {
         return Ok(None);
     }
-    let (what, change): (_, Box<dyn Fn(&mut PointCloud) + Sync + Send>) = match scale {
+    let (what, change): (_, Change) = match scale {
         Some(scale) => {
             let heights = crs.vertical_unit.filter(|other| *other != unit);
             let heights = heights.map_or_else(String::new, |other| format!(", heights in {}", other.name()));

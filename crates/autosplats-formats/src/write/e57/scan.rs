@@ -102,7 +102,7 @@ impl Scans<'_, '_, '_> {
     /// Writes what stands before the packets of a scan.
     fn begin(&mut self, run: &Run) -> Result<(), Error> {
         let (job, known) = (self.job, self.known);
-        let values = self.values(&known.like(), run);
+        let values = self.values(known.like(), run);
         let fixed = 6 + 2 * values.len() + 4;
         let bits: usize = values.iter().map(|value| value.source.bits()).sum();
         // Every stream gets whole bytes, so that no value lies in two packets.
