@@ -28,10 +28,10 @@ All readers:
 - A header's counts are compared with the file's size before memory is allocated. A broken file gives a message of one
   line: the file, the position, what is wrong and the remedy.
 
-Octrees of many files are read part by part as COPC is, by the name of their folder or of the file that describes them,
-also by an address: EPT (`ept.json`; nodes of LAZ, plain or Zstandard) and Potree 2 (`metadata.json`; nodes plain or
-Brotli). PotreeConverter rounds coordinates down to its steps, and its compressed nodes are one step too high; points are
-where the file has them.
+Octrees of many files are read part by part, as COPC is. They are named by their folder, by the file that describes
+them, or by its address. EPT has `ept.json`, and nodes of LAZ, plain or Zstandard. Potree 2 has `metadata.json`, and nodes
+plain or Brotli. PotreeConverter rounds coordinates down to its steps, and its compressed nodes are one step too high.
+Points are where the file has them.
 
 Recordings (MCAP, ROS 1 bags, folders of ROS 2) are played, as are animations of glTF: see *Points that move* in the
 [README](../README.md).

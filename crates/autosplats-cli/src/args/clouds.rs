@@ -57,8 +57,8 @@ pub(crate) struct ConvertArgs {
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Running")]
 pub(crate) struct RoomArgs {
-    /// Memory for points, such as 500M. More points are worked on in parts if all inputs are LAS, LAZ, COPC, PLY, PCD,
-    /// E57, text or scenes; others are read whole [default: three quarters of what is free; for octrees one quarter, at
+    /// Memory for points, such as 500M. More points are worked on in parts. Inputs other than LAS, LAZ, COPC, PLY, PCD,
+    /// E57, text and scenes are read whole [default: three quarters of what is free; for octrees one quarter, at
     /// most 2G]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,

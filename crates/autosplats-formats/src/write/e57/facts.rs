@@ -160,7 +160,7 @@ impl RunFacts {
     }
 
     fn of(cloud: &PointCloud, points: Range<usize>, frame: Frame) -> Self {
-        let intensity = cloud.fields().iter().find(|field| field.name == "Intensity").map(|field| &field.values);
+        let intensity = named(cloud, "Intensity");
         let one = |i: usize| {
             let valid = is_finite(&cloud.positions()[i]);
             let value = intensity.map(|values| values.get(i)).filter(|value| value.is_finite());

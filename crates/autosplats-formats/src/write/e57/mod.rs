@@ -6,9 +6,9 @@
 //!
 //! # How it works
 //!
-//! What stands before the points of a scan depends on all of them, so the points are read several times: for what all
-//! hold, for what each scan holds, for the packets of scans, and for those of points that no sensor saw. A packet may
-//! end in another cloud than it begins in; points wait for the others of their packet.
+//! What stands before the points of a scan depends on all of them, so the points are read several times. First comes
+//! what all hold, then what each scan holds. Then the packets of scans are written, and those of points that no sensor
+//! saw. A packet may end in another cloud than it begins in; points wait for the others of their packet.
 
 mod facts;
 mod pages;
