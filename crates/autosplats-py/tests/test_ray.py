@@ -210,6 +210,18 @@ def test_ctrl_c_keeps_what_is_done(cluster, many, tmp_path):
     assert contents(tmp_path / "out") == whole
 
 
+def test_a_task_ends_with_its_mark(tmp_path):
+    mark = tmp_path / "mark"
+    with pytest.raises(OSError, match="does not share its folder"), engine._while_there(str(mark)):
+        raise AssertionError("it was not wanted from the start")
+    mark.touch()
+    threading.Timer(0.2, mark.unlink).start()
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), engine._while_there(str(mark)):
+        time.sleep(30)
+    assert time.monotonic() - began < 15
+
+
 def test_bad_usage(cluster, tiles, tmp_path):
     with pytest.raises(autosplats.ArgumentError, match="connected to a cluster already"):
         run(jobs.tile_normals(tiles, tmp_path / "out"), address="auto")

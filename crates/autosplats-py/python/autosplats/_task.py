@@ -160,13 +160,18 @@ def digest(values: object) -> str:
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
+def unfinished_of(work: str) -> Path:
+    """The folder for what is of no use when the run ends; made if it is not there."""
+    folder = Path(work) / "unfinished"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
 @contextmanager
 def unfinished(output: str, work: str) -> Iterator[str]:
     """A path for a file that becomes `output` once it is whole. Should the process die, it is left in `work`, which
     goes when the job ends."""
-    folder = Path(work) / "unfinished"
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{uuid.uuid4().hex}-{os.path.basename(output)}"
+    path = unfinished_of(work) / f"{uuid.uuid4().hex}-{os.path.basename(output)}"
     try:
         yield str(path)
         os.replace(path, output)

@@ -11,24 +11,30 @@ All machines need the same paths, by a shared file system, and this package in t
 
 from __future__ import annotations
 
+import _thread
 import math
 import os
+import signal
 import statistics
 import sys
+import threading
 import time
-from collections.abc import Sequence
+import uuid
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from . import _core
 from ._errors import ArgumentError, Error
 from ._job import Job, Progress, Report, Run, failed
-from ._task import Row, Task, run_task
+from ._task import Row, Task, run_task, unfinished_of, unseen
 from ._threads import set_num_threads
 
 #: Tasks that wait for each that can run at once, so that no machine waits for the driver.
 _AHEAD = 2
-#: Seconds between two looks at stragglers and at the size of the cluster.
+#: Seconds between two looks at stragglers and at the size of the cluster, and of a worker at whether it is to go on.
 _STEP = 1.0
 #: How many times as long as others a task takes before it is started once more, and at least how many seconds.
 _SLOW, _SLOW_SECONDS = 3.0, 10.0
@@ -139,6 +145,9 @@ class _Engine:
         #: What a task takes, by Ray's names.
         self._wanted = {"num_cpus": num_cpus, "num_gpus": num_gpus}
         self._remote = ray.remote(max_retries=retries, retry_exceptions=[OSError])(_on_worker)
+        #: A file for each copy of a task, which is to be done while the file is there. Ray's own way to cancel a task
+        #: can end this process, if the task is done at that moment.
+        self._marks: dict[Any, Path] = {}
         #: Seconds per effort of finished tasks.
         self._paces: list[float] = []
         self._nodes: list[dict[str, float]] = []
@@ -155,7 +164,10 @@ class _Engine:
 
         def start(one: _Running) -> None:
             options = {**self._wanted, "memory": self._bytes(one.task)}
-            copy = self._remote.options(**options).remote(one.task, self._threads, _core.VERSION)
+            mark = unfinished_of(one.task.work) / f"{uuid.uuid4().hex}-wanted"
+            mark.touch()
+            copy = self._remote.options(**options).remote(one.task, self._threads, _core.VERSION, str(mark))
+            self._marks[copy] = mark
             one.copies.append(copy)
             of_copy[copy] = one.task.name
 
@@ -178,6 +190,7 @@ class _Engine:
                         start(one)
                 finished, _ = ray.wait(list(of_copy), num_returns=1, timeout=_STEP)
                 for copy in finished:
+                    self._unmark(copy)
                     name = of_copy.pop(copy)
                     one = running[name]
                     one.copies.remove(copy)
@@ -207,9 +220,12 @@ class _Engine:
     def _cancel(self, copies: Sequence[Any]) -> None:
         """Ends tasks, and waits until they have ended, since they write files."""
         for copy in copies:
-            self._ray.cancel(copy, force=True)
+            self._unmark(copy)
         if copies:
             self._ray.wait(list(copies), num_returns=len(copies), timeout=_END)
+
+    def _unmark(self, copy: Any) -> None:
+        self._marks.pop(copy).unlink(missing_ok=True)
 
     def _slots(self) -> int:
         """How many tasks can run at once."""
@@ -239,13 +255,60 @@ class _Engine:
         return sorted(late, key=lateness, reverse=True)
 
 
-def _on_worker(task: Task, threads: int, version: str) -> Row:
-    """Performs a task in a worker of Ray."""
+def _on_worker(task: Task, threads: int, version: str, mark: str) -> Row:
+    """Performs a task in a worker of Ray while there is the file `mark`."""
     import ray
 
     set_num_threads(threads)
     cards = ray.get_gpu_ids()
-    return run_task(task, device=_device(int(cards[0])) if cards else None, version=version)
+    try:
+        with _while_there(mark):
+            return run_task(task, device=_device(int(cards[0])) if cards else None, version=version)
+    except KeyboardInterrupt:
+        raise Error("the job has ended") from None
+
+
+@contextmanager
+def _while_there(path: str) -> Iterator[None]:
+    """Interrupts what it encloses, as Ctrl-C does, when a file is gone."""
+    if not _is_there(path):
+        raise unseen(path, "the job has ended, or this machine does not share its folder")
+    over, main_thread = threading.Event(), threading.get_ident()
+
+    def watch() -> None:
+        while not over.wait(_STEP):
+            if not _is_there(path):
+                _interrupt(main_thread)
+                return
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def _interrupt(main_thread: int) -> None:
+    """Interrupts the main thread, as Ctrl-C does."""
+    if sys.platform == "win32":
+        _thread.interrupt_main()
+    else:
+        # This ends waiting of the system too.
+        signal.pthread_kill(main_thread, signal.SIGINT)
+
+
+def _is_there(path: str) -> bool:
+    """Whether there is a file, as the share itself knows: by opening it, since what is known of names may be old."""
+    try:
+        with open(path, "rb"):
+            return True
+    except FileNotFoundError:
+        return False
+    except OSError:
+        # The share cannot tell for now.
+        return True
 
 
 def _device(card: int) -> str | int:
