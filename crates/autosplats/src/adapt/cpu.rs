@@ -21,7 +21,7 @@ use super::through::{MIN_TESTED_FIRST_RADII, shrink_to_share};
 use crate::camera::View;
 use crate::cancel::Cancel;
 use crate::fit::Surfel;
-use crate::project::{DensityGrid, PointNames, ScreenPoints};
+use crate::project::{DensityGrid, ScreenPoints};
 
 /// Surfels per task.
 const TASK: usize = 256;
@@ -43,8 +43,6 @@ struct Task<'a> {
 pub(crate) struct Adapter {
     cells: Cells,
     sheets: Sheets,
-    /// Names of this frame's points.
-    names: PointNames,
     /// Measured from the first surfels of a frame.
     usual: Option<FrameStatistics>,
 }
@@ -54,7 +52,6 @@ impl Adapter {
     pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32, cancel: &Cancel<'_>) {
         self.cells.fill(screen, view, k, cancel);
         self.sheets.clear(&self.cells);
-        self.names.clone_from(&screen.names);
         self.usual = None;
     }
 
@@ -74,8 +71,8 @@ impl Adapter {
         known: &DepthNoise,
         cancel: &Cancel<'_>,
     ) {
-        let Self { cells, sheets, names, usual } = self;
-        let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, rules.k, names));
+        let Self { cells, sheets, usual } = self;
+        let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, rules.k));
         sheets.level = usual.sheet_level as usize;
         let known = &known.seen_by(view);
         let task = Task { cells, density, view, rules, usual, known };

@@ -42,7 +42,7 @@ const LIBRARY: Library = Library {
         constants!(in noise:
             CERTAIN_NOISE_SHARES, FULL_K_RADIUS_CONTRAST, GROWTH_END_DIVISOR, GROWTH_POWER_RAMP, LEAST_PAIRS,
             LEAST_SAMPLE, MAX_STEADY_RATIO, MAX_THIN_SHARE_RISE, MIN_BALL_SHARE_DIVISOR, MIN_K_RADIUS_CONTRAST,
-            MOST_SAMPLED, NOISE_QUANTILE, NOISE_SAMPLE_COUNT, NOISE_SHARES, ROUNDING_SCATTER_RADII, STEADY_SCALES,
+            CELL_SHIFT, MOST_SAMPLED, NOISE_QUANTILE, NOISE_SAMPLE_COUNT, NOISE_SHARES, ROUNDING_SCATTER_RADII, STEADY_SCALES,
             STRUCTURE_GROWTH_POWER, THICK_NOISE, THIN_SCATTER_RADII, THIN_SHARE, UNEVEN_NOISE_QUANTILE,
             UNEVEN_NOISE_SHARES
         ),
@@ -146,21 +146,14 @@ pub(crate) struct AdaptBuffers {
     statistics: wgpu::Buffer,
     /// Owned by [`DepthNoiseBuffer`].
     depth_noise: wgpu::Buffer,
-    /// [`PointNames`](crate::project::PointNames), owned by the cloud on the device.
-    names: wgpu::Buffer,
 }
 
 impl AdaptBuffers {
-    /// Allocates for pictures of `size`; `known` holds the noise of the cloud, `names` its points' names.
+    /// Allocates for pictures of `size`; `known` holds the noise of the cloud.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
-    pub(crate) fn new(
-        gpu: &Gpu,
-        size: [u32; 2],
-        known: &DepthNoiseBuffer,
-        names: &wgpu::Buffer,
-    ) -> Result<Self, Error> {
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], known: &DepthNoiseBuffer) -> Result<Self, Error> {
         let most_finest = most_finest(gpu.most_bound());
         let sheet_cells = most_sheet_cells(size, most_finest);
         Ok(Self {
@@ -180,7 +173,6 @@ impl AdaptBuffers {
             quantiles: gpu.storage::<Quantile>("quantiles of scatter", SAMPLE_PARTS * SCALES + STEADY_SCALES)?,
             statistics: gpu.storage::<FrameStatistics>("statistics of surfels", 1)?,
             depth_noise: known.runs.clone(),
-            names: names.clone(),
         })
     }
 
@@ -343,13 +335,13 @@ impl AdaptPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
         let AdaptBuffers { levels, arguments, clusters, asked, sheets, .. } = buffers;
-        let AdaptBuffers { picked, sampled, scatters, quantiles, statistics, depth_noise, names, .. } = buffers;
+        let AdaptBuffers { picked, sampled, scatters, quantiles, statistics, depth_noise, .. } = buffers;
         let mut steps = Vec::new();
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
             let noise = [frame, surfels, sampled, quantiles, statistics, levels, depth_noise, arguments];
             steps.extend([
-                self.pick.step(gpu, &[counters, surfels, names, picked], screen.groups(round.work_64())),
+                self.pick.step(gpu, &[frame, counters, surfels, picked], screen.groups(round.work_64())),
                 self.sample.step(gpu, &[surfels, picked, sampled], (MOST_SAMPLED as u32).div_ceil(SMALL_GROUP)),
                 self.scatter.step(gpu, &balls, (SCALES * MOST_SAMPLED) as u32),
                 self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], (SAMPLE_PARTS * SCALES) as u32),

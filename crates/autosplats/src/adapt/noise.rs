@@ -1,6 +1,7 @@
 //! The noise level: how far points scatter about the surface.
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
@@ -11,7 +12,7 @@ use super::sheets::SHEET_LEVELS;
 use super::{SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
-use crate::project::{DensityGrid, PointNames};
+use crate::project::DensityGrid;
 
 /// Expected number of sampled surfels; with no more surfels than this, nearly all are sampled.
 pub(crate) const NOISE_SAMPLE_COUNT: usize = 1024;
@@ -28,6 +29,9 @@ pub(super) const STRUCTURE_GROWTH_POWER: f32 = 0.8;
 pub(super) const GROWTH_POWER_RAMP: f32 = 0.4;
 /// Noise grows up to twice the k-radius that one in this many sampled points exceeds; outliers may be further apart.
 pub(super) const GROWTH_END_DIVISOR: usize = 8;
+/// Shift of the cells of [`hash_place`], in cells. Points often lie at round numbers, where rounding would decide on
+/// the cell; thirds are no binary fractions.
+pub(super) const CELL_SHIFT: f32 = 1.0 / 3.0;
 /// Surfels per task when scatter is measured.
 const TASK: usize = 32;
 /// Surfels per task when the sample is picked.
@@ -156,16 +160,17 @@ pub(crate) fn measure(
     density: &DensityGrid,
     view: &View,
     k: u32,
-    names: &PointNames,
 ) -> FrameStatistics {
     let of = |surfel: Surfel| {
         let radius = first_radius(&surfel, density, view, k);
         Sampled { surfel, radius, scatter: [None; SCALES] }
     };
     let below = picked_below(surfels.len());
+    let eye = view.eye_parts();
     // A dropped point has no ball; cells lack the neighbours of near points.
-    let is_picked =
-        |surfel: &&Surfel| !surfel.is_dropped() && !surfel.is_near() && hash_index(names.of(surfel.source)) < below;
+    let is_picked = |surfel: &&Surfel| {
+        !surfel.is_dropped() && !surfel.is_near() && hash_place(surfel.center.into(), eye, view) < below
+    };
     let mut sample: Vec<Sampled> =
         surfels.par_iter().with_min_len(PICK_TASK).filter(is_picked).copied().map(of).collect();
     sample.truncate(MOST_SAMPLED);
@@ -187,14 +192,31 @@ pub(crate) fn measure(
     FrameStatistics { noise, k_radius, sheet_level }
 }
 
-/// Limit of the [`hash_index`] of a point's name below which a surfel is sampled, for a number of surfels. Choosing by
-/// point keeps the sample nearly the same from frame to frame. Choosing by place, one more surfel would change it all.
+/// Limit of the [`hash_place`] of a point below which a surfel is sampled, for a number of surfels.
 fn picked_below(surfels: usize) -> u32 {
     (u32::MAX / surfels.max(NOISE_SAMPLE_COUNT) as u32).saturating_mul(NOISE_SAMPLE_COUNT as u32)
 }
 
+/// Hashes a place in view space, the same for all places in a cell of the world: a cube half a pixel to a pixel wide
+/// there, which has one or two points. So the sample does not depend on the order of points, and is nearly the same
+/// from frame to frame. `eye` is that of [`View::eye_parts`].
+#[inline(always)]
+fn hash_place(place: Vec3, [high, low]: [Vec3; 2], view: &View) -> u32 {
+    // Cells per unit of length: a power of two, so that the first part of the eye is divided exactly.
+    let pixel = view.pixel_size(place.z).to_bits();
+    let cells = f32::from_bits(0x7f00_0000_u32.wrapping_sub(pixel & 0x7f80_0000));
+    let whole = (high * cells).floor();
+    let part = (high * cells - whole) + low * cells + view.to_world(place) * cells + CELL_SHIFT;
+    let number = |whole: f32, part: f32| {
+        let low_bits = whole - (whole * 0.5_f32.powi(32)).round_ties_even() * 2.0_f32.powi(32);
+        (low_bits as i32).wrapping_add(part.floor() as i32) as u32
+    };
+    let [x, y, z] = [0, 1, 2].map(|axis| number(whole[axis], part[axis]));
+    mix(mix(mix(x) ^ y) ^ z)
+}
+
 /// Hashes a number to another one, one to one [finalizer of MurmurHash3].
-fn hash_index(number: u32) -> u32 {
+fn mix(number: u32) -> u32 {
     let number = (number ^ (number >> 16)).wrapping_mul(0x85eb_ca6b);
     let number = (number ^ (number >> 13)).wrapping_mul(0xc2b2_ae35);
     number ^ (number >> 16)
@@ -331,3 +353,6 @@ fn quantile(values: &mut [f32], share: f32) -> f32 {
     let at = (share * values.len() as f32) as usize;
     *values.select_nth_unstable_by(at, f32::total_cmp).1
 }
+
+#[cfg(test)]
+mod tests;

@@ -145,7 +145,7 @@ impl Case {
     }
 
     pub(crate) fn usual(&self) -> FrameStatistics {
-        measure(&self.fitted[0], &self.cells(), &self.screen.density, &self.view, K, &self.screen.names)
+        measure(&self.fitted[0], &self.cells(), &self.screen.density, &self.view, K)
     }
 
     pub(crate) fn noise(&self) -> Noise {

@@ -237,6 +237,12 @@ impl View {
         Vec3::new((pixel[0] - self.middle[0]) * scale, (pixel[1] - self.middle[1]) * scale, depth)
     }
 
+    /// The eye in world coordinates as two parts: the nearest `f32`, and what they lack.
+    pub(crate) fn eye_parts(&self) -> [Vec3; 2] {
+        let high = self.eye.as_vec3();
+        [high, (self.eye - high.as_dvec3()).as_vec3()]
+    }
+
     /// A view-space vector in world axes.
     #[inline(always)]
     pub(crate) fn to_world(&self, vector_view: Vec3) -> Vec3 {

@@ -56,6 +56,8 @@ pub(crate) struct FrameUniform {
     pub(crate) past_middle: [f32; 2],
     /// Factors on a view-space vector before the transposed rotation turns it into world axes; the fourth is 0.
     pub(crate) unstretched: [f32; 4],
+    /// The parts of the eye's position in world coordinates, each padded to four numbers.
+    pub(crate) eye_parts: [[f32; 4]; 2],
 }
 
 impl FrameUniform {
@@ -96,6 +98,7 @@ impl FrameUniform {
                 let [x, y, z] = view.unstretched();
                 [x, y, z, 0.0]
             },
+            eye_parts: view.eye_parts().map(|part| [part.x, part.y, part.z, 0.0]),
         }
     }
 

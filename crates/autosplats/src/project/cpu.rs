@@ -64,7 +64,6 @@ impl Projector {
         compact(&points, view, &keys, spacing_px, screen);
         near.list(&points, view, k as usize + 1);
         append_near(&points, view, near, screen);
-        screen.names = points.names;
         measure_density(screen, view, spacing_px, k);
         split(rules, view, screen);
         screen

@@ -98,7 +98,7 @@ impl DeviceCloud {
     }
 
     /// Names of the points, once there is [room](Self::resize) for any.
-    pub(crate) fn names(&self) -> Option<&wgpu::Buffer> {
+    pub(super) fn names(&self) -> Option<&wgpu::Buffer> {
         self.names.as_ref()
     }
 

@@ -36,7 +36,7 @@ pub(crate) use cpu::Projector;
 pub(crate) use device_cloud::ChunkUniform;
 pub(crate) use device_cloud::{Chunk, DeviceCloud, PointValues, Uploader};
 pub(crate) use sixteenths::{Sixteenths, half_at};
-pub(crate) use slots::{PointNames, SlotTable};
+pub(crate) use slots::SlotTable;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -135,7 +135,6 @@ pub(crate) struct ScreenPoints {
     pub(crate) points: Vec<ScreenPoint>,
     /// Index in the cloud of each screen point.
     pub(crate) source: Vec<u32>,
-    pub(crate) names: PointNames,
     /// Index of the first point of the sparse cells (`near`), among which near points have their neighbours. The number
     /// of points if there are none.
     pub(crate) near_first: usize,

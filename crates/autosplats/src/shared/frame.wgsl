@@ -56,6 +56,8 @@ struct Frame {
     past_middle: vec2f,
     // Factors on a view-space vector before the transposed rotation turns it into world axes; the fourth is 0.
     unstretched: vec4f,
+    // The eye in world coordinates: the nearest numbers, and what they lack; the fourths are 0.
+    eye_parts: array<vec4f, 2>,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -210,8 +210,8 @@ impl Prepared {
         let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
         let past_radii = past_buffer(gpu, shape.coherent.then_some(size))?;
         let surfels = surfel_buffer(gpu, screen.capacity)?;
-        let adapt = match adapt.zip(cloud.names()) {
-            Some((passes, names)) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise, names)?)),
+        let adapt = match adapt {
+            Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
             None => None,
         };
         let over_time = over_time.as_ref().filter(|_| shape.average);

@@ -80,6 +80,7 @@ fn mirrored() -> [Mirrored; 16] {
                 middle,
                 past_middle,
                 unstretched,
+                eye_parts,
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, slot_shift, slots }),
