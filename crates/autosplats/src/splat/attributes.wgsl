@@ -1,7 +1,8 @@
 // Attribute pass: the weighted mean of all living splats within ε of the depth map, and the rims for the trim [Paper,
 // §7].
 //
-// Reads: linear, splats, tree, surfels, values, depth_map. Writes: surface, cover, extras.
+// Reads: linear, splats, tree, surfels, values, depth_map. Writes: surface, cover, extras; not again where a patch was
+// and stays empty.
 
 #import frame
 #import depth_map
@@ -177,9 +178,17 @@ fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     own_y = f32(pixel.y) + vec4f(0.5, 1.5, 2.5, 3.5);
     begin(&upper, pixel);
     begin(&lower, pixel + vec2u(0u, 4u));
-    draw_patch(corner, local);
+    let mark = patch_mark(corner);
+    let was_left_empty = cover[mark].point == LEFT_EMPTY;
+    let is_met = draw_patch(corner, local);
+    if was_left_empty && !is_met {
+        return;
+    }
     end(&upper, pixel);
     end(&lower, pixel + vec2u(0u, 4u));
+    if local == 0u {
+        cover[mark].point = select(LEFT_EMPTY, 0u, is_met);
+    }
 }
 
 // Index of the pixel `below` rows under another; that of the last row if it lies beyond the picture.

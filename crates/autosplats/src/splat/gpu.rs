@@ -35,6 +35,7 @@ const LIBRARY: Library = Library {
         "lines",
         "marked",
         "patch",
+        "patches",
         "recovered",
         "redraw",
         "splat",
@@ -322,6 +323,11 @@ fn cells([columns, rows]: [u32; 2]) -> u32 {
 /// Blocks of pixels in a picture of this size.
 fn block_count(size: [u32; 2]) -> u32 {
     size.map(|side| side.div_ceil(BLOCK_PX as u32)).iter().product()
+}
+
+/// Patches of a picture of this size.
+pub(super) fn patch_count(size: [u32; 2]) -> usize {
+    std::array::from_fn::<usize, 2, _>(|axis| size[axis].div_ceil(PATCH[axis]) as usize).iter().product()
 }
 
 /// Workgroups for rectangles of this many columns and rows.

@@ -2,6 +2,7 @@
 
 use autosplats_cloud::ValueOrigin;
 
+use super::gpu::patch_count;
 use super::{GBuffer, TILE_AREA, Tiles};
 use crate::Error;
 use crate::camera::View;
@@ -140,7 +141,8 @@ pub(crate) struct LayerBuffers {
     pub(crate) channels: Channels,
     /// Normal and depth, four `f32` per pixel.
     pub(crate) surface: wgpu::Buffer,
-    /// Per pixel sum of weights, rim, point (`u32`) and scalar: `Cover` in `shared/layers.wgsl`.
+    /// Per pixel sum of weights, rim, point (`u32`) and scalar: `Cover` in `shared/layers.wgsl`. Then an element for
+    /// each patch (`splat/imports/patches.wgsl`).
     pub(crate) cover: wgpu::Buffer,
     /// Planes of four `f32` per pixel, one after the other. A plane of linear RGB if there are colours, then one of
     /// splat radius, k-radius and curvature if there are measures. With backs alone there is one plane, otherwise
@@ -175,7 +177,7 @@ impl LayerBuffers {
             size,
             channels,
             surface: gpu.storage::<[f32; 4]>("normals and depths", pixels)?,
-            cover: gpu.storage::<Cover>("cover of pixels", pixels)?,
+            cover: gpu.storage::<Cover>("cover of pixels", pixels + patch_count(size))?,
             extras: gpu.storage::<[f32; 4]>("colours and measures", channels.planes() * pixels)?,
         })
     }

@@ -8,6 +8,7 @@
 #import groups
 #import layers
 #import noise
+#import patches
 #import picture
 
 @group(0) @binding(1) var<storage, read> cover: array<Cover>;
@@ -24,10 +25,14 @@ fn sum_blocks(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     }
     let first = BLOCK_PX * vec2u(at % all.x, at / all.x);
     let end = min(first + BLOCK_PX, frame.size);
+    let is_left_empty = cover[patch_mark(first)].point == LEFT_EMPTY;
     var rims = 0u;
     for (var y = first.y; y < end.y; y++) {
         for (var x = first.x; x < end.x; x++) {
-            let rim = cover[y * frame.size.x + x].rim;
+            var rim = EMPTY_RIM;
+            if !is_left_empty {
+                rim = cover[y * frame.size.x + x].rim;
+            }
             let bit = BLOCK_PX * (y - first.y) + x - first.x;
             rims |= select(select(0u, 0x10000u, rim < EMPTY_RIM), 1u, rim == EMPTY_RIM) << bit;
         }

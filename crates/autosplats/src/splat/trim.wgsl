@@ -1,7 +1,7 @@
 // Trim: removes the tails that splats leave around a silhouette. The CPU form is `trim.rs`.
 //
 // Reads: centers, sixteenths, statistics, blocks. Reads and writes: surface, cover, extras. Writes: counters. Of other
-// pixels it reads only the rims, which no invocation writes.
+// pixels it reads only the rims, which no invocation writes. Squares that no splat meets are left as they are.
 
 #import frame
 #import blocks
@@ -9,6 +9,7 @@
 #import groups
 #import layers
 #import noise
+#import patches
 #import picture
 
 @group(0) @binding(1) var<storage, read_write> surface: array<vec4f>;
@@ -45,11 +46,22 @@ var<workgroup> middles: array<vec2u, WIDE>;
 // Bits of empty blocks, per row of blocks, likewise.
 var<workgroup> empty_blocks: array<atomic<u32>, 2u * WIDE_BLOCKS>;
 var<workgroup> is_any_empty: atomic<u32>;
+// Whether no splat meets the square.
+var<workgroup> is_left_empty: bool;
 // Masks of the sixteenths ahead in each direction, then those behind: two words of four rows each.
 var<workgroup> sides: array<vec2u, 2u * DIRECTIONS>;
 
 @compute @workgroup_size(SMALL_GROUP)
 fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let columns = (frame.size.x + SQUARE - 1u) / SQUARE;
+    let group = group_index(workgroup);
+    let corner = SQUARE * vec2u(group % columns, group / columns);
+    if local == 0u {
+        is_left_empty = is_square_left_empty(corner);
+    }
+    if workgroupUniformLoad(&is_left_empty) {
+        return;
+    }
     if local == 0u {
         atomicStore(&covered, 0u);
         atomicStore(&tail_count, 0u);
@@ -69,9 +81,6 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         sides[local] = masks[local];
     }
     workgroupBarrier();
-    let columns = (frame.size.x + SQUARE - 1u) / SQUARE;
-    let group = group_index(workgroup);
-    let corner = SQUARE * vec2u(group % columns, group / columns);
     // The margin is a block wide.
     const ACROSS_WIDE = WIDE / BLOCK_PX;
     for (var place = local; place < ACROSS_WIDE * ACROSS_WIDE && TRIMS == 1u; place += SMALL_GROUP) {
@@ -141,6 +150,17 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     if local == 0u && atomicLoad(&covered) > 0u {
         atomicAdd(&counters[COVERED], atomicLoad(&covered));
     }
+}
+
+fn is_square_left_empty(corner: vec2u) -> bool {
+    for (var y = corner.y; y < min(corner.y + SQUARE, frame.size.y); y += PATCH.y) {
+        for (var x = corner.x; x < min(corner.x + SQUARE, frame.size.x); x += PATCH.x) {
+            if cover[patch_mark(vec2u(x, y))].point != LEFT_EMPTY {
+                return false;
+            }
+        }
+    }
+    return true;
 }
 
 // Empties a pixel.

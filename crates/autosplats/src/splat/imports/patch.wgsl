@@ -11,6 +11,7 @@
 // invocation draws the splats that meet both its column and its band.
 
 #import frame
+#import patches
 #import splat
 
 // Rows of an invocation. As many invocations draw a patch as splats are drawn at a time.
@@ -59,14 +60,9 @@ fn own_offset(local: u32) -> vec2u {
     return vec2u(local % PATCH.x, OWN_ROWS * (local / PATCH.x));
 }
 
-// Columns and rows of patches.
-fn patches() -> vec2u {
-    return (frame.size + PATCH - 1u) / PATCH;
-}
-
-// Draws all living splats into the patch with first pixel `corner`. Loops break at their end: most patches need a
+// Draws all living splats into the patch with first pixel `corner`. Returns whether any meets it. Loops break at their end: most patches need a
 // single pass, and software devices pay for a pass that only ends a loop.
-fn draw_patch(corner: vec2u, local: u32) {
+fn draw_patch(corner: vec2u, local: u32) -> bool {
     let end = tree[0].x;
     if local < 2u * HIT_WORDS {
         atomicStore(&hits[local], 0u);
@@ -75,6 +71,7 @@ fn draw_patch(corner: vec2u, local: u32) {
     // Roots: groups of nodes of the top level.
     let size = 1u << (FAN_BITS * (TOP + 1u));
     let roots = (end + size - 1u) / size;
+    var is_met = false;
     var root = 0u;
     loop {
         let tops = find(TOP, root, roots, corner, local, end);
@@ -87,6 +84,7 @@ fn draw_patch(corner: vec2u, local: u32) {
                 var leaf = 0u;
                 loop {
                     let found = find(SPLATS, leaf, leaves, corner, local, end);
+                    is_met |= found > 0u;
                     var at = 0u;
                     loop {
                         prepare(corner, local, at, found);
@@ -118,6 +116,7 @@ fn draw_patch(corner: vec2u, local: u32) {
             break;
         }
     }
+    return is_met;
 }
 
 // Number of nodes whose children at a level are tested at a time.
