@@ -132,8 +132,9 @@ impl Textures {
         let most = gpu.device.limits().max_texture_dimension_2d;
         if let Some(side) = size.into_iter().find(|&side| side > most) {
             return Err(Error::Device(format!(
-                "the splat-communication-raster search draws into textures of the size of the picture, and {side} pixels \
-                 are more than the {most} that the device allows; use a smaller picture or its form in compute shaders"
+                "the splat-communication-raster search draws into textures of the size of the picture, and {side} \
+                 pixels are more than the {most} that the device allows; use a smaller picture or its form in compute \
+                 shaders"
             )));
         }
         let target = |label, format| gpu.target(label, size, format);

@@ -94,8 +94,8 @@ fn splat_communication_is_refused_where_it_cannot_run() {
     assert!(own.check(&Settings::default()).is_ok(), "other engines run");
     compare(&mut own, &cloud, &camera, SIZE, &Settings::default(), "after a refusal");
 
-    // The raster form runs with this one feature and WebGPU's default limits, also in debug builds, which check indirect
-    // draws. The compute form needs no feature.
+    // The raster form runs with this one feature and WebGPU's default limits, also in debug builds, which check
+    // indirect draws. The compute form needs no feature.
     let (device, queue) = own_device_with(wgpu::Features::FLOAT32_BLENDABLE, 128 << 20).expect("a device");
     let mut able = Renderer::with_device(device, queue).expect("a renderer");
     let drawn = frame_of(&mut able, &cloud, &camera, &by_raster());

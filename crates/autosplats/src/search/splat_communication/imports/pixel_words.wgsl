@@ -1,6 +1,6 @@
-// What the compute form keeps of pixels, in one list. First the index of the point of each pixel, row by row. Then a bit
-// for each pixel with a point, in rows of whole words. Then, in such rows too, a bit for each of those words that is
-// not 0.
+// What the compute form keeps of pixels, in one list. First the index of the point of each pixel, row by row. Then a
+// bit for each pixel with a point, in rows of whole words. Then a bit for each of those words that is not 0, also in
+// rows.
 
 #import frame
 
