@@ -9,13 +9,16 @@ use anyhow::{Context as _, Result};
 use serde_json::Value;
 
 /// Name and options of each scene, the most telling first.
-const SCENES: [(&str, &[&str]); 6] = [
-    ("statue", &["--scene", "statue:1M", "--frames", "200"]),
-    ("paper", &["--scene", "statue:1M", "--frames", "200", "-k", "10", "--points-per-pixel", "1", "--no-trim"]),
-    ("cathedral", &["--scene", "cathedral:10M", "--frames", "60"]),
-    ("noise", &["--scene", "statue:1M", "--frames", "100", "--noise", "0.005"]),
-    ("uploads", &["--scene", "cathedral:10M", "--frames", "20", "--stream"]),
-    ("100M", &["--scene", "cathedral:100M", "--frames", "30"]),
+const SCENES: [(&str, &str); 8] = [
+    ("statue", "--scene statue:1M --frames 200"),
+    ("paper", "--scene statue:1M --frames 200 -k 10 --points-per-pixel 1 --no-trim"),
+    ("cathedral", "--scene cathedral:10M --frames 60"),
+    ("noise", "--scene statue:1M --frames 100 --noise 0.005"),
+    ("uploads", "--scene cathedral:10M --frames 20 --stream"),
+    // The paper's engine in both forms, with as many points as its bunny.
+    ("communication", "--scene statue:36K --frames 50 -k 10 --no-trim --engine splat-communication"),
+    ("by raster", "--scene statue:36K --frames 50 -k 10 --no-trim --engine splat-communication-raster"),
+    ("100M", "--scene cathedral:100M --frames 30"),
 ];
 /// Passes that are listed, the longest.
 const LISTED: usize = 8;
@@ -23,18 +26,18 @@ const LISTED: usize = 8;
 /// Measures every scene twice, by stages and by passes, and prints both. What one scene lacks does not end the others.
 pub(crate) fn run(program: &Path) {
     for (name, options) in SCENES {
-        for each in [&[][..], &["--passes"]] {
-            match bench(program, &[options, each].concat()).and_then(|bench| described(&bench)) {
-                Ok(lines) => println!("{name} {}\n{lines}", each.concat()),
-                Err(error) => println!("{name} {}\n  {error:#}", each.concat()),
+        for each in ["", "--passes"] {
+            match bench(program, &format!("{options} {each}")).and_then(|bench| described(&bench)) {
+                Ok(lines) => println!("{name} {each}\n{lines}"),
+                Err(error) => println!("{name} {each}\n  {error:#}"),
             }
         }
     }
 }
 
-fn bench(program: &Path, options: &[&str]) -> Result<Value> {
+fn bench(program: &Path, options: &str) -> Result<Value> {
     let mut command = Command::new(program);
-    command.args(["bench", "--backend", "gpu", "--json", "--quiet"]).args(options);
+    command.args(["bench", "--backend", "gpu", "--json", "--quiet"]).args(options.split_whitespace());
     let output = command.stdin(Stdio::null()).env("NODEVICE_SELECT", "1").output()?;
     let message = String::from_utf8_lossy(&output.stderr);
     anyhow::ensure!(output.status.success(), "{}", message.trim());

@@ -80,7 +80,11 @@ const SETTINGS: &[&str] = &[
 const VARIED_ON_GPU: usize = 2;
 
 /// Engines that only a GPU has. The first radius is given, because the best one is found by time.
-const GPU_ENGINES: [&str; 2] = ["-k 10 --engine splat-communication", "-k 10 --engine kd-tree --first-radius 0.05"];
+const GPU_ENGINES: [&str; 3] = [
+    "-k 10 --engine splat-communication",
+    "-k 10 --engine splat-communication-raster",
+    "-k 10 --engine kd-tree --first-radius 0.05",
+];
 
 /// Points that move: frames of one run look back at each other.
 const MOVING: [(&str, &str); 7] = [

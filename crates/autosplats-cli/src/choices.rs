@@ -54,8 +54,10 @@ pub(crate) enum AxesChoice {
 pub(crate) enum Engine {
     /// Reads buckets of screen points around each point; exact
     ScreenGrid,
-    /// The paper's engine: points draw splats onto each other's pixels; GPU only, slower
+    /// The paper's engine, in compute shaders: points splat onto each other's pixels; GPU only, slower
     SplatCommunication,
+    /// The same, drawn by the raster pipeline as in the paper; slow on cards for data centres
+    SplatCommunicationRaster,
     /// The paper's baseline: a kd-tree over all points, rebuilt in each frame; GPU only, see --first-radius
     KdTree,
 }
@@ -71,6 +73,7 @@ impl Engine {
         match self {
             Self::ScreenGrid => autosplats::SearchEngine::ScreenGrid,
             Self::SplatCommunication => autosplats::SearchEngine::SplatCommunication,
+            Self::SplatCommunicationRaster => autosplats::SearchEngine::SplatCommunicationRaster,
             Self::KdTree => autosplats::SearchEngine::KdTree { first_radius: first_radius.unless_best() },
         }
     }

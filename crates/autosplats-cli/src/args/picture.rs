@@ -50,8 +50,8 @@ pub(crate) struct NeighborArgs {
     /// where points are noisy, and turns outliers into dots or drops them
     #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) k: Neighbors,
-    /// Number of points that a pixel keeps, 1 or 2; 2 preserves outlines, thin parts and dense scans. 1 with the engine
-    /// splat-communication and on devices with little memory
+    /// Number of points that a pixel keeps, 1 or 2; 2 preserves outlines, thin parts and dense scans. 1 with engines of
+    /// splat communication and on devices with little memory
     #[arg(
         long,
         value_name = "COUNT",

@@ -93,8 +93,9 @@ pub(crate) use {constants, files, indices};
 const SHARED: Library = Library {
     files: &[files!(in "../shared":
         "cloud_points", "density", "depth_map", "divide", "drawing_groups", "eigen", "frame", "groups", "half",
-        "layers", "matters", "moved", "names", "neighborhood", "noise", "orthonormal", "picture", "project_point",
-        "put_rounds", "put_work", "range_keys", "rank", "reproject", "round", "screen", "sum_before", "surfel",
+        "layers", "lines", "matters", "moved", "names", "neighborhood", "noise", "orthonormal", "picture",
+        "project_point", "put_rounds", "put_work", "range_keys", "rank", "reproject", "round", "screen", "sum_before",
+        "surfel",
     )],
     constants: &[constants![
         GROUPS_PER_ROW,

@@ -59,7 +59,7 @@ pub(super) struct CpuRenderer {
 pub(super) fn check_engine(engine: SearchEngine) -> Result<(), Error> {
     let engine = match engine {
         SearchEngine::ScreenGrid => return Ok(()),
-        SearchEngine::SplatCommunication => "the splat-communication search",
+        SearchEngine::SplatCommunication | SearchEngine::SplatCommunicationRaster => "the splat-communication search",
         SearchEngine::KdTree { .. } => "the kd-tree search of [ZHWG08]",
     };
     Err(Error::Device(format!("{engine} runs on a GPU only; ask for the GPU backend or the screen-grid engine")))

@@ -194,9 +194,9 @@ impl Renderer {
     }
 
     /// Creates a renderer on the caller's device. No feature is required, except that
-    /// [`SplatCommunication`](crate::SearchEngine::SplatCommunication) needs `FLOAT32_BLENDABLE`. The renderer uses
-    /// `SHADER_INT64`, `SHADER_INT64_ATOMIC_MIN_MAX` and `TIMESTAMP_QUERY` if the device has them. Without timestamps,
-    /// passes are not timed, and the time of a frame includes reading it back.
+    /// [`SplatCommunicationRaster`](crate::SearchEngine::SplatCommunicationRaster) needs `FLOAT32_BLENDABLE`. The
+    /// renderer uses `SHADER_INT64`, `SHADER_INT64_ATOMIC_MIN_MAX` and `TIMESTAMP_QUERY` if the device has them.
+    /// Without timestamps, passes are not timed, and the time of a frame includes reading it back.
     ///
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has; [`Error::DeviceMemory`].

@@ -132,7 +132,7 @@ impl Rules {
         let is_adaptive = mode == Mode::Adaptive;
         // The paper's engine has one point a pixel and no margin: it leaves one point in a thousand unfinished, and
         // such points beside a picture hide much of it.
-        let is_exact = engine != SearchEngine::SplatCommunication;
+        let is_exact = engine.is_exact();
         let halves = is_exact && settings.points_per_pixel == 2;
         let margin_px =
             if is_exact && is_adaptive { size[0].min(size[1]).div_ceil(PICTURE_SIDE_PER_MARGIN) } else { 0 };

@@ -53,7 +53,7 @@ pub struct Reconstruction {
     ///
     /// 1 keeps the nearest point, as in the paper. 2 keeps the nearest point of each half of the pixel. Two points
     /// preserve silhouettes and thin parts where points are denser than pixels; search and fit take up to twice as
-    /// long. [`SearchEngine::SplatCommunication`] and devices with too little memory always use 1. See
+    /// long. [`SearchEngine::SplatCommunication`], in both forms, and devices with too little memory always use 1. See
     /// docs/decisions/0001-two-points-a-pixel.md.
     pub points_per_pixel: u32,
     /// Adapt the reconstruction to noise, scan lines, outliers and tiny clouds. Default: on.
@@ -65,7 +65,7 @@ pub struct Reconstruction {
     ///   [`outlier_expansions`](Self::outlier_expansions) is `None`.
     /// * A neighbourhood of a single neighbour ends only at a wider [gap](Self::gap_factor).
     /// * Points in a margin around the picture count as neighbours. The margin is a twelfth of the picture's shorter
-    ///   side. [`SearchEngine::SplatCommunication`] and devices with too little memory have no margin.
+    ///   side. [`SearchEngine::SplatCommunication`], in both forms, and devices with too little memory have no margin.
     /// * A cloud of fewer than 64 finite points is drawn as dots, without trimming or temporal smoothing.
     ///
     /// Surfaces without noise and scan lines stay as they are.

@@ -1,10 +1,10 @@
 //! The choice of a search engine on the GPU.
 
+use super::SearchEngine;
 use super::engine::{EnginePasses, EngineSteps, SearchBuffers};
 use super::kd_tree::gpu::KdTreePasses;
 use super::screen_grid::gpu::SearchPasses;
-use super::splat_communication::gpu::CommunicationPasses;
-use super::{SearchEngine, splat_communication};
+use super::splat_communication::{compute, raster};
 use crate::Error;
 use crate::gpu::Gpu;
 use crate::project::gpu::Round;
@@ -28,8 +28,8 @@ pub(crate) fn convergence(runs: &[u32]) -> Vec<u32> {
 /// [`Error::Device`] if the device cannot run it.
 pub(crate) fn check_engine(gpu: &Gpu, engine: SearchEngine) -> Result<(), Error> {
     match engine {
-        SearchEngine::SplatCommunication => splat_communication::gpu::check(gpu),
-        SearchEngine::ScreenGrid | SearchEngine::KdTree { .. } => Ok(()),
+        SearchEngine::SplatCommunicationRaster => raster::check(gpu),
+        SearchEngine::ScreenGrid | SearchEngine::SplatCommunication | SearchEngine::KdTree { .. } => Ok(()),
     }
 }
 
@@ -40,7 +40,8 @@ pub(crate) fn check_engine(gpu: &Gpu, engine: SearchEngine) -> Result<(), Error>
 pub(crate) fn compile(gpu: &Gpu, engine: SearchEngine, k: u32) -> Result<Box<dyn EnginePasses>, Error> {
     match engine {
         SearchEngine::ScreenGrid => Ok(Box::new(SearchPasses::new(gpu, k)?)),
-        SearchEngine::SplatCommunication => Ok(Box::new(CommunicationPasses::new(gpu)?)),
+        SearchEngine::SplatCommunication => Ok(Box::new(compute::CommunicationPasses::new(gpu)?)),
+        SearchEngine::SplatCommunicationRaster => Ok(Box::new(raster::CommunicationPasses::new(gpu)?)),
         SearchEngine::KdTree { .. } => Ok(Box::new(KdTreePasses::new(gpu)?)),
     }
 }

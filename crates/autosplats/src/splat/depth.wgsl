@@ -29,7 +29,7 @@ fn depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     if index < len {
         let bounds = tree[level_start(SPLATS) + first + index];
         if !is_empty(bounds) && bounds_area(bounds) <= MAX_GROUP_PX {
-            tell_lines(bounds, local);
+            tell_lines(rows_of(bounds), local);
         }
     }
     let lines = line_count();

@@ -29,7 +29,7 @@ fn erase(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     if index < len && changes[index] == DIED {
         let bounds = living_bounds(tree[level_start(SPLATS) + index]);
         if bounds_area(bounds) <= MAX_GROUP_PX {
-            tell_lines(bounds, local);
+            tell_lines(rows_of(bounds), local);
         }
     }
     let lines = line_count();

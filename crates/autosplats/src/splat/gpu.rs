@@ -32,7 +32,6 @@ const LIBRARY: Library = Library {
         "fragment",
         "hidden",
         "large",
-        "lines",
         "marked",
         "patch",
         "patches",

@@ -28,7 +28,7 @@ fn redraw(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     if index < len {
         let bounds = tree[level_start(SPLATS) + index];
         if !is_empty(bounds) && bounds_area(bounds) <= MAX_GROUP_PX && is_redrawn(index, bounds) {
-            tell_lines(bounds, local);
+            tell_lines(rows_of(bounds), local);
         }
     }
     let lines = line_count();

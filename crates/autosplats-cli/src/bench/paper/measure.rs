@@ -29,16 +29,20 @@ const MAX_LEVEL_DIFFERENCE: u8 = 2;
 pub(super) enum Method {
     GridCpu,
     GridGpu,
-    /// The paper's engine.
+    /// The paper's engine, in compute shaders.
     Communication,
+    /// The paper's engine, on the raster pipeline as in the paper.
+    CommunicationRaster,
     /// The paper's baseline.
     KdTree,
 }
 
 impl Method {
-    pub(super) const ALL: [Self; 4] = [Self::GridCpu, Self::GridGpu, Self::Communication, Self::KdTree];
+    pub(super) const ALL: [Self; 5] =
+        [Self::GridCpu, Self::GridGpu, Self::Communication, Self::CommunicationRaster, Self::KdTree];
     /// Methods in Figure 10. The paper shows its own search, which takes any k without preparation.
-    pub(super) const BY_STAGE: [Self; 3] = [Self::GridCpu, Self::GridGpu, Self::Communication];
+    pub(super) const BY_STAGE: [Self; 4] =
+        [Self::GridCpu, Self::GridGpu, Self::Communication, Self::CommunicationRaster];
 
     /// Name in tables.
     pub(super) fn name(self) -> &'static str {
@@ -46,6 +50,7 @@ impl Method {
             Self::GridCpu => "screen grid, CPU",
             Self::GridGpu => "screen grid, GPU",
             Self::Communication => "splat communication, GPU",
+            Self::CommunicationRaster => "splat communication by raster, GPU",
             Self::KdTree => "kd-tree, GPU",
         }
     }
@@ -55,8 +60,14 @@ impl Method {
         match self {
             Self::GridCpu | Self::GridGpu => SearchEngine::ScreenGrid,
             Self::Communication => SearchEngine::SplatCommunication,
+            Self::CommunicationRaster => SearchEngine::SplatCommunicationRaster,
             Self::KdTree => SearchEngine::KdTree { first_radius },
         }
+    }
+
+    /// Whether it is a form of splat communication.
+    pub(super) fn communicates(self) -> bool {
+        matches!(self, Self::Communication | Self::CommunicationRaster)
     }
 
     pub(super) fn is_on_gpu(self) -> bool {

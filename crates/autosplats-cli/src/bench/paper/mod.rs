@@ -139,7 +139,7 @@ fn tasks(scene: &PaperScene, ks: &[u32], few_ks: &[u32]) -> Vec<Task> {
     tasks.extend(methods().map(Task::Accuracy));
     tasks.push(Task::Culling);
     tasks.extend(Method::BY_STAGE.into_iter().flat_map(|method| {
-        let ks = if method == Method::Communication { few_ks } else { ks };
+        let ks = if method.communicates() { few_ks } else { ks };
         ks.iter().map(move |&k| Task::Stages(method, k))
     }));
     match scene.name {

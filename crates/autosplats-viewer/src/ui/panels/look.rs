@@ -204,6 +204,7 @@ fn search(ui: &mut egui::Ui, look: &mut Look, picture: Option<&Picture>) {
     let engines = [
         ("screen grid", SearchEngine::ScreenGrid),
         ("splat communication", SearchEngine::SplatCommunication),
+        ("splat communication by raster", SearchEngine::SplatCommunicationRaster),
         ("kd-tree", SearchEngine::KdTree { first_radius }),
     ];
     choose(ui, "engine", &mut reconstruction.engine, &engines);

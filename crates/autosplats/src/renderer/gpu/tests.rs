@@ -18,6 +18,8 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
         crate::search::past::gpu::PASSES,
         crate::search::screen_grid::gpu::PASSES,
         crate::search::splat_communication::gpu::PASSES,
+        crate::search::splat_communication::compute::PASSES,
+        crate::search::splat_communication::raster::PASSES,
         crate::search::kd_tree::gpu::PASSES,
         crate::fit::gpu::PASSES,
         crate::fit::orient::gpu::PASSES,

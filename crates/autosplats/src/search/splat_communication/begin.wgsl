@@ -1,4 +1,4 @@
-// Sets the amounts that a round's passes draw, before the first iteration. One invocation.
+// Sets the amounts of work of a round's passes, before the first iteration. One invocation.
 //
 // Reads: counters. Writes: arguments, convergence.
 
@@ -20,8 +20,8 @@ fn begin() {
     arguments.boxes = Draw(BOX_VERTICES * counters[VISIBLE], has_work, 0u, 0u);
     arguments.last_clear = arguments.clear;
     arguments.last_boxes = arguments.boxes;
-    let groups = (queries + LARGE_GROUP - 1u) / LARGE_GROUP;
-    arguments.count = vec3u(min(groups, GROUPS_PER_ROW), (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW, 1u);
+    arguments.queries_groups = groups_of(queries);
+    arguments.points_groups = groups_of(counters[VISIBLE] * has_work);
     arguments.iterations = 0u;
     // Unconverged queries of each round, before the first iteration and after each.
     let curve = arrayLength(&convergence) / 2u;

@@ -1,4 +1,4 @@
-// Decides after an iteration whether another follows: passes without instances cost next to nothing. One invocation.
+// Decides after an iteration whether another follows: passes without work cost next to nothing. One invocation.
 //
 // Reads: counters. Writes: arguments, convergence.
 
@@ -21,6 +21,7 @@ fn decide() {
     if f32(convergence[at + 1u]) <= UNCONVERGED * f32(queries) {
         arguments.clear.instances = 0u;
         arguments.boxes.instances = 0u;
-        arguments.count = vec3u(0u);
+        arguments.queries_groups = vec3u(0u);
+        arguments.points_groups = vec3u(0u);
     }
 }

@@ -1,6 +1,7 @@
-//! The splat-communication engine: the paper's own k-radius search, on the raster pipeline [Paper, §4, §5, §6].
+//! The splat-communication engine: the paper's own k-radius search [Paper, §4, §5, §6], in two forms that take the same
+//! steps. The raster form draws, as the paper does; the compute form splats the same boxes in compute shaders.
 //!
-//! # How it works
+//! # How the raster form works
 //! Points exchange data by drawing. A point draws a *box splat*, two triangles that tightly cover the projection of a
 //! sphere about the point. Each fragment loads the point that owns its pixel from a texture of positions and computes
 //! the distance. The fragment is discarded or blended into the pixel, as a message to the point there. The depth mask
@@ -27,14 +28,26 @@
 //! Finally every query draws the radius found, and two more gathering passes sum the moments, `mean` and `covariance`.
 //! The k-radius is the distance to the furthest neighbour summed.
 //!
-//! # Where the engine differs from the paper
+//! # How the compute form differs
+//! It visits the same pixels of the same boxes with the same tests, so k-radii and convergence have the same bits.
+//!
+//! - A workgroup shares out the rows of 256 boxes. Bits tell which pixels have points, so that empty ones cost next to
+//!   nothing. The rest of the mask test is made with the point's depth.
+//! - Textures are lists with an entry for each screen point. MAX is an atomic maximum of the bits of distances, which
+//!   are not negative. ADD is an atomic sum. An answer is counted once, at the least radius that reaches it; sums of
+//!   these counts are the four counters.
+//! - Bounds stay where they are, so no pass hands them on. A point clears its own counters once it has read them.
+//! - Sums of floats would depend on the order of atomics. So in the end every query visits the pixels of its own box
+//!   and sums its neighbours itself, row by row (`sum`); nothing is distributed any more.
+//!
+//! # Where both forms differ from the paper
 //!
 //! - Converged points are counted by a compute pass over the queries, not by an occlusion query: WebGPU's queries only
 //!   tell whether there are any.
 //! - Projection is not a raster pass but the compute passes of `project/`, as in all engines; `mask` draws the result.
-//! - T_F and T_R are cleared by a triangle that the depth mask limits to the pixels of points. The triangle has no
-//!   instances once iterations end, so that results stay.
-//! - A point is a box of two triangles, or of one pixel where that suffices: WebGPU has no geometry shader.
+//! - In the raster form T_F and T_R are cleared by a triangle that the depth mask limits to the pixels of points. The
+//!   triangle has no instances once iterations end, so that results stay. A point is a box of two triangles, or of one
+//!   pixel where that suffices: WebGPU has no geometry shader.
 //! - f(z) is the highest 24 bits of the number, not of the projection matrix, so that no far plane has to be found.
 //! - α is √((k+1)/σ), at least 1.15, instead of √(k/σ). Any radius up to the next neighbour will do, and aiming at the
 //!   k-th itself misses every second time.
@@ -51,7 +64,7 @@
 //! - Iterations end at t_conv or after 16, because a frame is recorded in advance. With λ near 1 or a large e0,
 //!   sixteen steps of √λ or √k may not reach the end of a gap or the outlier radius. Such points count as bounded.
 //!
-//! See docs/decisions/0015-search-engines.md for the costs.
+//! See docs/decisions/0015-search-engines.md and 0060-communication-in-compute.md for the costs.
 //!
 //! # Where the result differs from the other engines
 //!
@@ -63,4 +76,8 @@
 //! furthest point of a radius, not the nearest. Distances between different points that round to 0, in clouds some
 //! 1e-19 units wide, count as 0.
 
+pub(crate) mod compute;
 pub(crate) mod gpu;
+pub(crate) mod raster;
+#[cfg(test)]
+mod tests;

@@ -56,6 +56,11 @@ fn living_bounds(bounds: vec2u) -> vec2u {
     return vec2u(bounds.x & ~DEAD, bounds.y);
 }
 
+// Number of rows of bounds that are not empty.
+fn rows_of(bounds: vec2u) -> u32 {
+    return lasts(bounds).y - firsts(bounds).y + 1u;
+}
+
 // Number of pixels of bounds that are not empty.
 fn bounds_area(bounds: vec2u) -> u32 {
     let sides = lasts(bounds) - firsts(bounds) + 1u;

@@ -84,7 +84,21 @@ fn mirrored() -> [Mirrored; 16] {
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, slot_shift, slots }),
-        mirrored!("Arguments", Arguments { points, queries, clear, boxes, last_clear, last_boxes, count, iterations }),
+        mirrored!(
+            "Arguments",
+            Arguments {
+                points,
+                queries,
+                clear,
+                boxes,
+                last_clear,
+                last_boxes,
+                queries_groups,
+                iterations,
+                points_groups,
+                padding,
+            }
+        ),
         mirrored!("Cover", Cover { weight, rim, point, scalar }),
         mirrored!("Sensor", Sensor { position, first }),
         mirrored!("DepthRun", DepthRun { position, first, axis, factor, power, padding }),
@@ -165,10 +179,12 @@ fn structs_lie_alike_in_rust_and_wgsl() {
 
 #[test]
 fn buffers_have_room_for_structs() {
+    use crate::search::splat_communication::compute;
     use crate::search::{kd_tree, screen_grid};
     use crate::{adapt, splat};
     let rooms = [
         (adapt::gpu::PASSES, adapt::gpu::SIZES),
+        (compute::PASSES, compute::SIZES),
         (kd_tree::gpu::PASSES, kd_tree::gpu::SIZES),
         (screen_grid::gpu::PASSES, screen_grid::gpu::SIZES),
         (splat::gpu::PASSES, splat::gpu::SIZES),

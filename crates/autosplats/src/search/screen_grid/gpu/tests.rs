@@ -95,12 +95,17 @@ impl Moments {
         // Rounding of a sum of squares and a root.
         ensure((self.k_radius - host.k_radius).abs() <= 1e-6 * host.k_radius, "k-radius")?;
         ensure(self.count == host.count, "count")?;
-        // Rounding of up to `count` additions of terms up to the radius, squared.
+        ensure(self.has_sums_near(host, 1.0), "sums")
+    }
+
+    /// Whether the sums differ by no more than the rounding, so many `times`, of up to `count` additions of terms up to
+    /// the radius, squared.
+    pub(crate) fn has_sums_near(&self, other: &Self, times: f32) -> bool {
         let near = |a: &[f32], b: &[f32], unit: f32| {
-            a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 2e-7 * (host.count + 4.0) * unit)
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() <= times * 2e-7 * (other.count + 4.0) * unit)
         };
-        ensure(near(&self.offset, &host.offset, host.k_radius), "offset")?;
-        ensure(near(&self.second, &host.second, host.k_radius * host.k_radius), "second moments")
+        near(&self.offset, &other.offset, other.k_radius)
+            && near(&self.second, &other.second, other.k_radius * other.k_radius)
     }
 }
 

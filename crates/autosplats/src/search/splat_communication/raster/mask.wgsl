@@ -6,7 +6,7 @@
 
 #import frame
 #import communication
-#import density
+#import first_radius
 #import screen
 #import splat_box
 
@@ -23,11 +23,8 @@ struct Splat {
 fn mask_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
     let point = points[vertex / BOX_VERTICES];
     let pixel = pixel_xy(point.pixel);
-    let depth = point.position_view.z;
-    let cell_px = counters[CELL_PX];
-    let cell = density_cell(pixel, cell_px, counters[CELL_COLUMNS]);
-    let radius = max(initial_radius_of(density[cell].count, cell_px, depth), MIN_POSITIVE);
-    return Splat(pixel_vertex(pixel, vertex, mask_depth(depth)), vec4f(point.position_view, radius));
+    let position = pixel_vertex(pixel, vertex, mask_depth(point.position_view.z));
+    return Splat(position, vec4f(point.position_view, first_radius(point)));
 }
 
 @fragment

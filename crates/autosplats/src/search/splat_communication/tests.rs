@@ -1,15 +1,18 @@
-//! Splat communication against the screen grid on the host.
+//! Splat communication against the screen grid on the host, and its two forms against each other.
 
 use autosplats_cloud::glam::DVec3;
 
-use super::*;
+use super::gpu::{ITERATIONS, UNCONVERGED};
+use super::raster::{GATHERED_BYTES, Textures};
+use super::{compute, raster};
 use crate::camera::{Camera, Projection, View};
-use crate::gpu::{Clock, Recorder, read_back, test_gpu};
+use crate::gpu::{Clock, Gpu, Recorder, read_back, test_gpu};
 use crate::project::DeviceCloud;
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{ProjectRules, ScreenPoints};
 use crate::search::SearchRules;
+use crate::search::engine::{EnginePasses, SearchBuffers};
 use crate::search::gpu::convergence;
 use crate::search::past::gpu::past_buffer;
 use crate::search::screen_grid::gpu::neighborhood_buffer;
@@ -18,7 +21,23 @@ use crate::test_clouds;
 
 const SIZE: [u32; 2] = [121, 90];
 
+/// The passes of both forms.
+struct Forms {
+    raster: raster::CommunicationPasses,
+    compute: compute::CommunicationPasses,
+}
+
+impl Forms {
+    fn new(gpu: &Gpu) -> Self {
+        Self {
+            raster: raster::CommunicationPasses::new(gpu).expect("passes"),
+            compute: compute::CommunicationPasses::new(gpu).expect("passes"),
+        }
+    }
+}
+
 /// The result of one frame's search.
+#[derive(Clone)]
 struct Found {
     /// Neighbourhoods of the active points, then of the passive.
     neighborhoods: Vec<Moments>,
@@ -33,13 +52,36 @@ fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (S
     projected(positions, camera, size, &ProjectRules { halves: false, ..ProjectRules::usual(k) })
 }
 
-fn on_device(
-    gpu: &Gpu,
-    passes: &CommunicationPasses,
-    screen: &ScreenPoints,
-    view: &View,
-    rules: &SearchRules,
-) -> Found {
+impl Found {
+    /// How the search by the compute form differs from that by the raster form: in nothing, to the last bit, apart from
+    /// the rounding of sums.
+    fn compare(&self, drawn: &Self) -> Result<(), String> {
+        let told = |found: &Self| (found.curve.clone(), found.clamped, found.bounded, found.neighborhoods.len());
+        if told(self) != told(drawn) {
+            return Err(format!("{:?}, drawn: {:?}", told(self), told(drawn)));
+        }
+        for (computed, drawn) in self.neighborhoods.iter().zip(&drawn.neighborhoods) {
+            let bits = |moments: &Moments| [moments.k_radius, moments.count].map(f32::to_bits);
+            // Both round their sums.
+            if bits(computed) != bits(drawn) || !computed.has_sums_near(drawn, 2.0) {
+                return Err(format!("{computed:?}, drawn: {drawn:?}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Searches by both forms, which have to agree, and returns what the compute form found.
+fn on_device(gpu: &Gpu, forms: &Forms, screen: &ScreenPoints, view: &View, rules: &SearchRules) -> Found {
+    let computed = by(gpu, &forms.compute, screen, view, rules);
+    let drawn = by(gpu, &forms.raster, screen, view, rules);
+    if let Err(different) = computed.compare(&drawn) {
+        panic!("{} points, {}x{}, {rules:?}: {different}", screen.points.len(), view.width, view.height);
+    }
+    computed
+}
+
+fn by(gpu: &Gpu, passes: &dyn EnginePasses, screen: &ScreenPoints, view: &View, rules: &SearchRules) -> Found {
     let buffers = upload_screen(gpu, screen, view);
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
     let frame = frame_buffer(gpu, view, rules);
@@ -81,7 +123,7 @@ fn allowed(screen: &ScreenPoints) -> usize {
 #[test]
 fn all_but_a_thousandth_is_what_the_host_finds() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let forms = Forms::new(&gpu);
     let (mut compared, mut wrong) = (0, 0);
     for k in [1, 3, 10, 17, 64] {
         for camera in cameras() {
@@ -91,7 +133,7 @@ fn all_but_a_thousandth_is_what_the_host_finds() {
                     let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient: e0 == Some(3) };
                     let case = format!("{name}, {:?}, {rules:?}", camera.projection);
                     let (host, [clamped, _]) = on_host(&screen, &view, &rules);
-                    let found = on_device(&gpu, &passes, &screen, &view, &rules);
+                    let found = on_device(&gpu, &forms, &screen, &view, &rules);
                     let different = different(&found.neighborhoods, &host, &case);
                     assert!(different <= allowed(&screen), "{case}: {different} of {} differ", host.len());
                     assert!(
@@ -114,7 +156,7 @@ fn all_but_a_thousandth_is_what_the_host_finds() {
 #[test]
 fn short_steps_and_far_outliers() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let forms = Forms::new(&gpu);
     let mut unfinished = 0;
     for (e0, lambda) in [(Some(1), 1.1), (Some(8), 1.1), (None, 1.1), (Some(8), 4.0), (None, 4.0)] {
         for (name, positions) in test_clouds::all(2000) {
@@ -122,7 +164,7 @@ fn short_steps_and_far_outliers() {
             let rules = SearchRules { k: 10, outlier_expansions: e0, gap_factor: Some(lambda), lenient: true };
             let case = format!("{name}, {rules:?}");
             let host = on_host(&screen, &view, &rules).0;
-            let found = on_device(&gpu, &passes, &screen, &view, &rules);
+            let found = on_device(&gpu, &forms, &screen, &view, &rules);
             let different = different(&found.neighborhoods, &host, &case);
             let allowed = found.bounded + allowed(&screen);
             assert!(different <= allowed, "{case}: {different} differ, {} unfinished", found.bounded);
@@ -135,12 +177,12 @@ fn short_steps_and_far_outliers() {
 #[test]
 fn pictures_of_any_shape() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let forms = Forms::new(&gpu);
     for size in [[1, 1], [2, 300], [301, 3], [64, 64]] {
         for camera in cameras() {
             let (screen, view) = screen(&test_clouds::sphere(2000), &camera, size, 10);
             let host = on_host(&screen, &view, &rules(10)).0;
-            let found = on_device(&gpu, &passes, &screen, &view, &rules(10));
+            let found = on_device(&gpu, &forms, &screen, &view, &rules(10));
             let different = different(&found.neighborhoods, &host, "sphere");
             assert!(different <= allowed(&screen), "{size:?}: {different} of {} differ", host.len());
         }
@@ -151,10 +193,10 @@ fn pictures_of_any_shape() {
 #[test]
 fn the_search_converges_as_in_the_paper() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let forms = Forms::new(&gpu);
     for (name, positions) in [("sphere", test_clouds::sphere(9000)), ("edge", test_clouds::edge(6000))] {
         let (screen, view) = screen(&positions, &cameras()[0], [240, 180], 10);
-        let Found { curve, .. } = on_device(&gpu, &passes, &screen, &view, &rules(10));
+        let Found { curve, .. } = on_device(&gpu, &forms, &screen, &view, &rules(10));
         let queries = screen.points.len() as f64;
         let left: Vec<_> = curve.iter().map(|&left| f64::from(left) / queries).collect();
         assert_eq!(left[0], 1.0, "{name}: every point is searched for");
@@ -169,7 +211,7 @@ fn the_search_converges_as_in_the_paper() {
 #[test]
 fn ties_belong() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let forms = Forms::new(&gpu);
     let lattice: Vec<_> = (0..400).map(|i| [(i % 20) as f32, (i / 20) as f32, 64.0]).collect();
     let camera = Camera {
         eye: DVec3::new(10.0, 10.0, 0.0),
@@ -180,7 +222,7 @@ fn ties_belong() {
     for k in [1, 3, 4, 5, 10, 16] {
         let (screen, view) = screen(&lattice, &camera, [64, 64], k);
         let host = on_host(&screen, &view, &rules(k)).0;
-        let found = on_device(&gpu, &passes, &screen, &view, &rules(k));
+        let found = on_device(&gpu, &forms, &screen, &view, &rules(k));
         assert_eq!(different(&found.neighborhoods, &host, "lattice"), 0, "k = {k}: {:?}", found.curve);
         assert_eq!(found.curve.last(), Some(&0), "k = {k}: all converge: {:?}", found.curve);
     }
@@ -190,7 +232,7 @@ fn ties_belong() {
 #[test]
 fn coincident_points() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let forms = Forms::new(&gpu);
     let mut positions = vec![[0.25, 0.125, 0.0]; 5000];
     positions.extend(test_clouds::plane(500));
     // A crowd so dense that rounding makes many distances equal.
@@ -205,7 +247,7 @@ fn coincident_points() {
         for k in [1, 10] {
             let (screen, view) = screen(&positions, &camera, SIZE, k);
             let host = on_host(&screen, &view, &rules(k)).0;
-            let found = on_device(&gpu, &passes, &screen, &view, &rules(k));
+            let found = on_device(&gpu, &forms, &screen, &view, &rules(k));
             let different = different(&found.neighborhoods, &host, "crowd");
             assert!(different <= allowed(&screen), "k = {k}: {different} of {} differ, {:?}", host.len(), found.curve);
         }
@@ -216,14 +258,14 @@ fn coincident_points() {
 #[test]
 fn huge_coordinates_reach_no_sum() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let forms = Forms::new(&gpu);
     for (near, huge) in [(1, 0), (1, 40), (200, 40)] {
         let mut positions = test_clouds::sphere(near);
         let forward = (test_clouds::EYE / test_clouds::EYE.z).as_vec3();
         positions.extend((0..huge).map(|i| (forward * (1e38 * (1.0 + 0.01 * i as f32))).to_array()));
         let (screen, view) = screen(&positions, &cameras()[1], [90, 70], 10);
         let host = on_host(&screen, &view, &rules(10)).0;
-        let found = on_device(&gpu, &passes, &screen, &view, &rules(10));
+        let found = on_device(&gpu, &forms, &screen, &view, &rules(10));
         let different = different(&found.neighborhoods, &host, "huge");
         assert!(different <= allowed(&screen), "{near} + {huge}: {different} of {} differ", host.len());
     }
@@ -232,9 +274,9 @@ fn huge_coordinates_reach_no_sum() {
 #[test]
 fn the_same_again() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let forms = Forms::new(&gpu);
     let (screen, view) = screen(&test_clouds::edge(4000), &cameras()[0], SIZE, 17);
-    let [first, second] = [(); 2].map(|()| on_device(&gpu, &passes, &screen, &view, &rules(17)));
+    let [first, second] = [(); 2].map(|()| on_device(&gpu, &forms, &screen, &view, &rules(17)));
     assert_eq!(first.neighborhoods, second.neighborhoods, "to the last bit");
     assert_eq!(first.curve, second.curve, "and the way there");
 }
@@ -246,6 +288,27 @@ fn comparison_sees_a_wrong_neighbourhood() {
     let other = on_host(&screen, &view, &rules(9)).0;
     assert_eq!(different(&right, &right, "same"), 0, "nothing is wrong yet");
     assert!(different(&other, &right, "another k") > allowed(&screen), "another k is another question");
+}
+
+#[test]
+fn comparison_sees_a_single_bit() {
+    let Some(gpu) = test_gpu() else { return };
+    let forms = Forms::new(&gpu);
+    let (screen, view) = screen(&test_clouds::clumps(500), &cameras()[0], SIZE, 10);
+    let right = on_device(&gpu, &forms, &screen, &view, &rules(10));
+    assert!(right.compare(&right).is_ok(), "nothing is wrong yet");
+    let wrong = |change: &dyn Fn(&mut Found)| {
+        let mut found = right.clone();
+        change(&mut found);
+        found.compare(&right).is_err()
+    };
+    assert!(right.neighborhoods[7].k_radius > 0.0 && right.curve.len() > 4, "there is something to change");
+    assert!(wrong(&|found| found.neighborhoods[7].k_radius = found.neighborhoods[7].k_radius.next_up()), "a radius");
+    assert!(wrong(&|found| found.neighborhoods[7].count += 1.0), "a neighbour");
+    assert!(wrong(&|found| found.curve[3] += 1), "a point of an iteration");
+    assert!(wrong(&|found| found.clamped += 1), "a clamped point");
+    let other = by(&gpu, &forms.compute, &screen, &view, &rules(9));
+    assert!(other.compare(&right).is_err(), "another k is another question");
 }
 
 /// A device with a limit of `bytes` per pixel of colour attachments.
@@ -260,19 +323,26 @@ fn own_device(required_features: wgpu::Features, bytes: u32) -> Gpu {
 }
 
 #[test]
-fn devices_that_cannot_run_it_are_refused() {
+fn devices_that_cannot_draw_are_refused_and_compute() {
     if test_gpu().is_none() {
         return;
     }
     let blends = wgpu::Features::FLOAT32_BLENDABLE;
     let cases = [(wgpu::Features::empty(), GATHERED_BYTES, "FLOAT32_BLENDABLE"), (blends, 16, "the device allows 16")];
+    let (screen, view) = screen(&test_clouds::sphere(500), &cameras()[0], SIZE, 10);
+    let host = on_host(&screen, &view, &rules(10)).0;
     for (features, bytes, why) in cases {
-        let refused = CommunicationPasses::new(&own_device(features, bytes)).expect_err("refused").to_string();
+        let gpu = own_device(features, bytes);
+        let refused = raster::CommunicationPasses::new(&gpu).expect_err("refused").to_string();
         assert!(refused.contains(why), "the message says why: {refused}");
-        assert!(refused.contains("--engine screen-grid"), "and what to do: {refused}");
+        assert!(refused.contains("--engine splat-communication)"), "and what to do: {refused}");
+        let passes = compute::CommunicationPasses::new(&gpu).expect("WebGPU's default limits are enough");
+        let found = by(&gpu, &passes, &screen, &view, &rules(10));
+        let different = different(&found.neighborhoods, &host, "sphere");
+        assert!(different <= allowed(&screen), "{different} of {} differ", host.len());
     }
     let gpu = own_device(blends, GATHERED_BYTES);
-    assert!(CommunicationPasses::new(&gpu).is_ok(), "WebGPU's default limits are enough");
+    assert!(raster::CommunicationPasses::new(&gpu).is_ok(), "WebGPU's default limits are enough");
     let most = gpu.device.limits().max_texture_dimension_2d;
     let refused = Textures::new(&gpu, [most + 1, 1]).err().expect("refused").to_string();
     assert!(refused.contains("smaller picture") && refused.contains(&most.to_string()), "{refused}");

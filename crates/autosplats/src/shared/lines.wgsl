@@ -1,10 +1,8 @@
 // The splats of a workgroup, an invocation each, as lines of pixels that all invocations share: none waits for another
-// whose splat is larger. Very large splats are left to all workgroups (`large`).
-
-#import splat
+// whose splat is larger.
 
 // Numbers of splats and of lines in `lines_told`: the latter in the low bits.
-const LINE_BITS = 22u;
+const LINE_BITS = 23u;
 
 // Splats and lines told so far.
 var<workgroup> lines_told: atomic<u32>;
@@ -20,9 +18,8 @@ fn clear_lines(local: u32) {
     workgroupBarrier();
 }
 
-// Tells the lines of an invocation's splat, one for each row of its bounds.
-fn tell_lines(bounds: vec2u, local: u32) {
-    let rows = lasts(bounds).y - firsts(bounds).y + 1u;
+// Tells the number of lines of an invocation's splat, one for each of its rows. A screen has less than 2¹⁵ rows.
+fn tell_lines(rows: u32, local: u32) {
     let told = atomicAdd(&lines_told, (1u << LINE_BITS) | rows);
     line_splats[told >> LINE_BITS] = local;
     lines_before[told >> LINE_BITS] = told & ((1u << LINE_BITS) - 1u);

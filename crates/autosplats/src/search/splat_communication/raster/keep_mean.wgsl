@@ -3,9 +3,9 @@
 // Reads: points, queries, the feedback texture and both radius textures. Writes: neighborhoods, counters.
 
 #import frame
+#import ending
 #import groups
 #import neighborhood
-#import radius_search
 #import round
 #import screen
 
@@ -32,10 +32,5 @@ fn keep_mean(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     neighborhoods[first + index].offset = sum.xyz;
     neighborhoods[first + index].count = sum.w;
     neighborhoods[first + index].k_radius = textureLoad(furthest, pixel, 0).w;
-    if how == CLAMPED_AT_GAP || how == OUT_OF_STEPS {
-        atomicAdd(&counters[CLAMPED], 1u);
-    }
-    if how == OUT_OF_STEPS {
-        atomicAdd(&counters[BOUNDED], 1u);
-    }
+    count_ending(how);
 }

@@ -5,7 +5,7 @@
 // Reads: points, queries, counters, arguments, the position texture and both radius textures. Writes: convergence.
 
 #import frame
-#import communication
+#import counting
 #import groups
 #import radius_search
 #import round
@@ -20,28 +20,17 @@
 @group(0) @binding(7) var counts: texture_2d<f32>;
 @group(0) @binding(8) var radii: texture_2d<f32>;
 
-var<workgroup> unconverged: atomic<u32>;
-
 @compute @workgroup_size(LARGE_GROUP)
 fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    if local == 0u {
-        atomicStore(&unconverged, 0u);
-    }
-    workgroupBarrier();
     let first = select(0u, counters[ACTIVE], ROUND == 1u);
     let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
     let index = group_index(workgroup) * LARGE_GROUP + local;
+    var is_unconverged = false;
     if index < len {
         let pixel = pixel_xy(points[queries[first + index]].pixel);
         let known = recall(textureLoad(radii, pixel, 0), textureLoad(counts, pixel, 0));
         let others = f32(counters[VISIBLE] - 1u);
-        if !has_ended(advance(known, textureLoad(positions, pixel, 0).w, others)) {
-            atomicAdd(&unconverged, 1u);
-        }
+        is_unconverged = !has_ended(advance(known, textureLoad(positions, pixel, 0).w, others));
     }
-    workgroupBarrier();
-    if local == 0u && atomicLoad(&unconverged) > 0u {
-        let curve = arrayLength(&convergence) / 2u;
-        atomicAdd(&convergence[ROUND * curve + arguments.iterations + 1u], atomicLoad(&unconverged));
-    }
+    count_unconverged(is_unconverged, local);
 }
