@@ -197,14 +197,14 @@ fn picked_below(surfels: usize) -> u32 {
     (u32::MAX / surfels.max(NOISE_SAMPLE_COUNT) as u32).saturating_mul(NOISE_SAMPLE_COUNT as u32)
 }
 
-/// Hashes a place in view space, the same for all places in a cell of the world: a cube an eighth to a quarter of a
-/// pixel wide there, which has mostly one point. So the sample does not depend on the order of points, and is nearly
+/// Hashes a place in view space, the same for all places in a cell of the world: a cube half a pixel to a pixel wide
+/// there, which has one or two points. So the sample does not depend on the order of points, and is nearly
 /// the same from frame to frame. The eye is that of [`View::eye_parts`].
 #[inline(always)]
 fn hash_place(place: Vec3, [high, low]: [Vec3; 2], view: &View) -> u32 {
     // Cells per unit of length: a power of two, so that the first part of the eye is divided exactly.
     let pixel = view.pixel_size(place.z).to_bits();
-    let cells = 4.0 * f32::from_bits(0x7f00_0000_u32.wrapping_sub(pixel & 0x7f80_0000));
+    let cells = f32::from_bits(0x7f00_0000_u32.wrapping_sub(pixel & 0x7f80_0000));
     let whole = (high * cells).floor();
     let part = (high * cells - whole) + low * cells + view.to_world(place) * cells + CELL_SHIFT;
     let number = |whole: f32, part: f32| {

@@ -19,7 +19,7 @@ fn mix_bits(number: u32) -> u32 {
 // Hashes a place in view space by the cell of the world that it lies in.
 fn hash_place(place: vec3f) -> u32 {
     let pixel = bitcast<u32>(pixel_size(place.z));
-    let cells = 4.0 * bitcast<f32>(0x7f000000u - (pixel & 0x7f800000u));
+    let cells = bitcast<f32>(0x7f000000u - (pixel & 0x7f800000u));
     let high = frame.eye_parts[0].xyz * cells;
     let whole = floor(high);
     let from_eye = (place * frame.unstretched.xyz) * frame.view_from_world;
