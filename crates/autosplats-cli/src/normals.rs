@@ -17,7 +17,7 @@ use crate::console::Console;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{check_cloud_target, forced, write_cloud};
-use crate::parts::{Need, Parts, WorkError, check_room, parts, sample_step};
+use crate::parts::{Need, Parts, WorkError, check_room, parts, sample_of};
 use crate::progress::Bar;
 
 /// Bytes per point beside the cloud: the search tree and the result.
@@ -115,7 +115,6 @@ struct Overview {
 
 impl Overview {
     fn of(clouds: &dyn Clouds) -> Result<Self, autosplats_cloud::Error> {
-        let step = sample_step(clouds);
         let (mut parts, mut scans, mut points) = (Vec::new(), Vec::new(), 0);
         let mut ends: Option<PointCloud> = None;
         clouds.read(&(), &mut |cloud| {
@@ -134,10 +133,7 @@ impl Overview {
                 None => ends = Some(corners),
                 Some(ends) => ends.append(corners),
             }
-            let mut few = cloud.clone();
-            few.keep_every(step);
-            few.retain_fields(|_| false);
-            parts.push(few);
+            parts.push(sample_of(cloud, clouds));
             Ok(())
         })?;
         let viewpoint = |scan: Scan| Viewpoint { position: scan.position(), points: scan.points };

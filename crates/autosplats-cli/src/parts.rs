@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use autosplats_cloud::{Clouds, Error, Output, Part, Progress as _, Spool, available_memory, check_disk, usual_memory};
-use autosplats_formats::{ReadOptions, TreeInput, TreeOptions, describe, write_clouds, write_tree};
+use autosplats_cloud::{
+    Clouds, Error, Output, Part, PointCloud, Progress as _, Spool, available_memory, check_disk, usual_memory,
+};
+use autosplats_formats::{ReadOptions, TreeInput, TreeOptions, Unpacking, describe, write_clouds, write_tree};
 
 use crate::args::{PartArgs, RoomArgs};
 use crate::console::Console;
@@ -21,9 +23,11 @@ const TREE_MEMORY: u64 = 256 << 20;
 /// Points that a sample has at most, if their number is known.
 const SAMPLE: u64 = 1 << 17;
 
-/// Of so many points one is in the sample that stands for points in parts.
-pub(crate) fn sample_step(clouds: &dyn Clouds) -> usize {
-    clouds.points().unwrap_or(u64::from(u32::MAX)).div_ceil(SAMPLE).max(1) as usize
+/// Those points of a part that are in the sample which stands for all of `clouds`.
+pub(crate) fn sample_of(part: &PointCloud, clouds: &dyn Clouds) -> PointCloud {
+    let step = clouds.points().unwrap_or(u64::from(u32::MAX)).div_ceil(SAMPLE).max(1);
+    let points: Vec<u32> = (0..part.len() as u32).step_by(step as usize).collect();
+    part.pick(&points)
 }
 
 /// Points of the inputs, which wait on the disk, and the room for work on them.
@@ -87,7 +91,9 @@ pub(crate) fn parts(
     let failed = |error| failure(error, output, &folder);
     let bar = Bar::on_file("reading", Path::new(&inputs.names()), console);
     let first = Part { whole: &bar, start: 0.0, len: 0.5 };
-    let Some(clouds) = inputs.in_parts(&first, console)? else {
+    let disk = |points: u64| points.saturating_mul(SPOOLED_BYTES + need.disk);
+    let unpacking = Unpacking { folder: &folder, leave: disk(points) };
+    let Some(clouds) = inputs.in_parts(unpacking, &first, console)? else {
         if room.memory.is_some() {
             console.note("--memory: not all of these formats can be read in parts, so all points are read at once");
         }
@@ -95,7 +101,7 @@ pub(crate) fn parts(
     };
     // Of text the number was a guess. If it was too high, work in parts is right nevertheless.
     let points = clouds.points().unwrap_or(points);
-    check_disk(&folder, points.saturating_mul(SPOOLED_BYTES + need.disk), need.what).map_err(failed)?;
+    check_disk(&folder, disk(points), need.what).map_err(failed)?;
     let second = Part { whole: &bar, start: 0.5, len: 0.5 };
     let clouds = Spool::of(&*clouds, &folder, &second).map_err(failed)?;
     bar.report(1.0);
@@ -158,11 +164,14 @@ impl From<autosplats::Error> for WorkError {
 pub(crate) fn failure(error: Error, output: &Path, temp: &Path) -> Failure {
     match &error {
         Error::Io { path, source } if path == output => cannot_write(output, source),
-        Error::Io { path, source } if path == temp => {
-            Failure::new(Exit::Output, format!("{}: {source}", temp.display()))
-        }
+        Error::Io { path, source } if path == temp => temporary_failure(temp, source),
         Error::OutOfMemory { .. } => Failure::new(Exit::Memory, error),
         Error::Cancelled => Failure::interrupted(),
         _ => Failure::from(error),
     }
+}
+
+/// The failure of temporary files in a folder.
+pub(crate) fn temporary_failure(temp: &Path, source: &std::io::Error) -> Failure {
+    Failure::new(Exit::Output, format!("{}: {source}", temp.display()))
 }

@@ -8,6 +8,7 @@ use std::{
 use crate::{
     Clouds, Crs, Error, Field, PointCloud, Progress, Scan, each_type,
     files::{read_exact_at, temporary_failed, temporary_unnamed, write_all_at},
+    identity::Identity,
 };
 
 /// Points of [`Clouds`], kept in a temporary file without a name, so that nothing is left whatever ends the program.
@@ -120,25 +121,25 @@ impl Spool {
         Ok(())
     }
 
-    fn part(&self, stored: &Stored) -> Result<PointCloud, Error> {
-        let (mut at, len) = (stored.at, stored.len);
-        let triples = |at: &mut u64| {
-            let mut values = vec![[0.0_f32; 3]; len];
-            self.get(at, bytemuck::cast_slice_mut(&mut values)).map(|()| values)
-        };
-        let positions = triples(&mut at)?;
-        let residuals = if stored.residuals { Some(triples(&mut at)?) } else { None };
-        let mut colors = stored.colors.then(|| vec![[0_u8; 3]; len]);
-        colors.iter_mut().try_for_each(|colors| self.get(&mut at, bytemuck::cast_slice_mut(colors)))?;
-        let mut fields: Vec<Field> = self.like.fields.iter().map(Field::without_values).collect();
-        for field in &mut fields {
-            each_type!(&mut field.values, v => {
-                v.resize(len, Default::default());
-                self.get(&mut at, bytemuck::cast_slice_mut(v))?;
-            });
+    /// Reads a part into a cloud of another one, whose memory is used again.
+    fn load(&self, stored: &Stored, part: &mut PointCloud) -> Result<(), Error> {
+        fn sized<T: Copy + Default + bytemuck::Pod>(values: &mut Vec<T>, len: usize) -> &mut [u8] {
+            values.resize(len, T::default());
+            bytemuck::cast_slice_mut(values)
         }
-        let scans = stored.scans.clone();
-        Ok(PointCloud { positions, residuals, colors, fields, scans, ..self.like.clone_without_points() })
+        let (mut at, len) = (stored.at, stored.len);
+        let (residuals, colors) = (part.residuals.take(), part.colors.take());
+        part.residuals = stored.residuals.then(|| residuals.unwrap_or_default());
+        part.colors = stored.colors.then(|| colors.unwrap_or_default());
+        self.get(&mut at, sized(&mut part.positions, len))?;
+        part.residuals.iter_mut().try_for_each(|values| self.get(&mut at, sized(values, len)))?;
+        part.colors.iter_mut().try_for_each(|values| self.get(&mut at, sized(values, len)))?;
+        for field in &mut part.fields {
+            each_type!(&mut field.values, v => self.get(&mut at, sized(v, len))?);
+        }
+        part.scans.clone_from(&stored.scans);
+        part.identity = Identity::default();
+        Ok(())
     }
 }
 
@@ -171,9 +172,11 @@ impl Clouds for Spool {
         take: &mut dyn FnMut(&PointCloud) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut done = 0;
+        let mut part = self.like.slice(0..0);
         for stored in &self.parts {
             progress.tick(done as f32 / self.points.max(1) as f32)?;
-            take(&self.part(stored)?)?;
+            self.load(stored, &mut part)?;
+            take(&part)?;
             done += stored.len as u64;
         }
         Ok(())

@@ -28,9 +28,9 @@ mod write;
 
 pub use pinhole::{DepthCamera, PinholeCamera};
 pub use read::{
-    Attribute, Description, Parts, ReadOptions, check_columns, check_not_lfs_pointer, describe, describe_bytes,
-    files_beside, formats, framing, gltf_animation, is_named_as_points, open_parts, open_parts_of, read, read_bytes,
-    read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with, table,
+    Attribute, Description, Parts, ReadOptions, Unpacking, check_columns, check_not_lfs_pointer, describe,
+    describe_bytes, files_beside, formats, framing, gltf_animation, is_named_as_points, open_parts, open_parts_of,
+    open_parts_unpacked, read, read_bytes, read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with, table,
 };
 pub use tree::{
     Part, TREE_FILES, describe_tree, is_tree_file, open_folder_tree, open_tree, open_tree_in, read_part, tree_file,

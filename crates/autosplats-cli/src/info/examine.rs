@@ -90,7 +90,7 @@ impl Examiner {
             drop(bar);
             return Ok(());
         }
-        let parts = self.room.spool(path, &self.options, &listener);
+        let parts = self.room.spool(path, points, &self.options, &listener);
         listener.notes().into_iter().for_each(|note| report.warn(note));
         drop(bar);
         let bar = Bar::new("measuring", &self.console);

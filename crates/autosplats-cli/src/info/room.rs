@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Error, Part, Progress, Spool, available_memory, check_disk, usual_memory};
-use autosplats_formats::{ReadOptions, open_parts};
+use autosplats_formats::{ReadOptions, Unpacking, open_parts_unpacked};
 
 use crate::args::RoomArgs;
 use crate::parts::SPOOLED_BYTES;
@@ -38,17 +38,19 @@ impl Room {
         memory.is_none_or(|memory| points.saturating_mul(BYTES_PER_POINT) <= memory)
     }
 
-    /// Reads the points of a file onto the disk. `None` if the file has to be read whole.
+    /// Reads the points of a file, about so many, onto the disk. `None` if the file has to be read whole.
     pub(super) fn spool(
         &self,
         path: &Path,
+        points: u64,
         options: &ReadOptions,
         progress: &dyn Progress,
     ) -> Result<Option<Spool>, Error> {
         let part = |start: f32| Part { whole: progress, start, len: 0.5 };
-        let Some(parts) = open_parts(path, options, &part(0.0))? else { return Ok(None) };
-        let points = parts.points() as u64;
-        check_disk(&self.folder, points.saturating_mul(SPOOLED_BYTES + DISK_BYTES), "examining the points")?;
+        let disk = |points: u64| points.saturating_mul(SPOOLED_BYTES + DISK_BYTES);
+        let unpacking = Unpacking { folder: &self.folder, leave: disk(points) };
+        let Some(parts) = open_parts_unpacked(path, options, unpacking, &part(0.0))? else { return Ok(None) };
+        check_disk(&self.folder, disk(parts.points() as u64), "examining the points")?;
         Spool::of(&parts, &self.folder, &part(0.5)).map(Some)
     }
 }

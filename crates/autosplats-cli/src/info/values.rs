@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::report::AttributeFound;
 use super::statistics::{Bins, Statistics, Summary, Values};
-use crate::parts::sample_step;
+use crate::parts::sample_of;
 
 /// Part of a cloud that an attribute becomes, if not a field of the same name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,9 +83,7 @@ pub(super) fn survey<'a>(
             *summary = values.map_or(*summary, |values| summary.and(values.summary()));
         }
         if clouds.whole().is_none() {
-            let mut sample = cloud.clone();
-            sample.keep_every(sample_step(clouds));
-            few.push(sample);
+            few.push(sample_of(cloud, clouds));
         }
         Ok(())
     })?;

@@ -8,13 +8,14 @@ use std::time::SystemTime;
 
 use autosplats_cloud::glam::DMat4;
 use autosplats_cloud::{Clouds, Error, Merged, Outline, Part, PointCloud, Progress};
-use autosplats_formats::{Parts, TreeInput, describe, is_tree_file, open_parts};
+use autosplats_formats::{Parts, TreeInput, Unpacking, describe, is_tree_file, open_parts, open_parts_unpacked};
 use autosplats_scenes::Scene;
 use autosplats_sources::{Input, Source};
 
 use super::{Inputs, differences, failure, is_made, read_whole};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
+use crate::parts::temporary_failure;
 
 /// Points of a scene that are generated at a time.
 const SCENE_PART: usize = 1 << 20;
@@ -33,17 +34,19 @@ impl Inputs {
         self.list.iter().map(points_at_most).sum()
     }
 
-    /// The inputs, to be read in parts, joined as whole ones are. `None` if they have to be read whole.
+    /// The inputs, to be read in parts soon, joined as whole ones are. `None` if they have to be read whole.
     pub(crate) fn in_parts(
         &self,
+        unpacking: Unpacking<'_>,
         progress: &dyn Progress,
         console: &Console,
     ) -> Result<Option<Box<dyn Clouds + '_>>, Failure> {
         let len = 1.0 / self.list.len() as f32;
         let several = self.list.len() > 1;
+        let unpacking = Some(unpacking).filter(|_| self.list.len() <= MOST_UNPACKED);
         let (mut kept, mut all) = (Vec::new(), Vec::new());
         for (index, input) in self.list.iter().enumerate() {
-            match parts_of(input, &Part { whole: progress, start: index as f32 * len, len }) {
+            match parts_of(input, unpacking, &Part { whole: progress, start: index as f32 * len, len }) {
                 Ok(None) => return Ok(None),
                 Ok(Some(clouds)) => {
                     kept.push(input);
@@ -52,6 +55,9 @@ impl Inputs {
                 // Of the tiles of a survey, some may have no point of a class.
                 Err(Error::NothingKept { filter, points, .. }) if several => {
                     console.note(format!("{}: --keep {filter} leaves none of its {points} points", input.name));
+                }
+                Err(Error::Io { path, source }) if unpacking.is_some_and(|to| to.folder == path) => {
+                    return Err(temporary_failure(&path, &source));
                 }
                 Err(error) => return Err(failure(input, error)),
             }
@@ -76,6 +82,9 @@ impl Inputs {
 /// Most inputs that are read in parts: each stays open.
 const MOST_INPUTS: usize = 1000;
 
+/// Most inputs of which decompressed points wait on the disk: each has a file there, which stays open.
+const MOST_UNPACKED: usize = 500;
+
 /// Number of points of an input, or more of them. `None` if it has to be read whole.
 fn points_at_most(input: &Input) -> Option<u64> {
     match &input.source {
@@ -93,10 +102,18 @@ fn points_at_most(input: &Input) -> Option<u64> {
 }
 
 /// An input, to be read in parts. `None` if it has to be read whole.
-fn parts_of<'a>(input: &'a Input, progress: &dyn Progress) -> Result<Option<Box<dyn Clouds + 'a>>, Error> {
+fn parts_of<'a>(
+    input: &'a Input,
+    unpacking: Option<Unpacking<'_>>,
+    progress: &dyn Progress,
+) -> Result<Option<Box<dyn Clouds + 'a>>, Error> {
     match &input.source {
         Source::File(path) if is_plain(input) => {
-            Ok(open_parts(path, &input.options, progress)?.map(|parts| Box::new(parts) as Box<dyn Clouds>))
+            let parts = match unpacking {
+                Some(unpacking) => open_parts_unpacked(path, &input.options, unpacking, progress)?,
+                None => open_parts(path, &input.options, progress)?,
+            };
+            Ok(parts.map(|parts| Box::new(parts) as Box<dyn Clouds>))
         }
         Source::Scene(scene, count) if is_plain(input) && !input.moves() => {
             Ok(Some(Box::new(SceneClouds { name: &input.name, scene, count: *count })))

@@ -10,6 +10,8 @@ use std::{
 
 use autosplats_cloud::{Error, read_exact_at, reserving};
 
+use super::parts::Unpacking;
+
 /// A file that is read again and again, and must not change meanwhile.
 pub(super) struct Opened {
     pub(super) path: PathBuf,
@@ -42,7 +44,7 @@ impl Opened {
     /// [`Error::Io`], and [`Error::Malformed`] if the file has changed.
     pub(super) fn reader(&self) -> Result<Reader<'_>, Error> {
         let file = File::open(&self.path).map_err(|source| self.failed(source))?;
-        let reader = Reader { opened: self, file };
+        let reader = Reader { opened: self, file, unpacking: None };
         reader.check()?;
         Ok(reader)
     }
@@ -63,9 +65,20 @@ impl Opened {
 pub(super) struct Reader<'a> {
     opened: &'a Opened,
     file: File,
+    unpacking: Option<Unpacking<'a>>,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    /// The same file, whose decompressed points may wait on a disk.
+    pub(super) fn unpacking_to(self, unpacking: Option<Unpacking<'a>>) -> Self {
+        Self { unpacking, ..self }
+    }
+
+    /// Where decompressed points may wait.
+    pub(super) fn unpacking(&self) -> Option<Unpacking<'a>> {
+        self.unpacking
+    }
+
     /// Number of bytes.
     pub(super) fn len(&self) -> usize {
         self.opened.len

@@ -6,7 +6,7 @@
 //! settled first, from the same samples and counts as if the file was read whole. Then the points can be passed on
 //! again and again, a few at a time, and are the same.
 
-use std::{borrow::Cow, fs::Metadata, path::Path};
+use std::{borrow::Cow, path::Path};
 
 use autosplats_cloud::{Bytes, Error, LeftOut, PointCloud, PointFilter, Progress, Unmarked};
 
@@ -53,6 +53,15 @@ pub struct Parts {
     points: usize,
 }
 
+/// Where points of a compressed file wait, so that they are decompressed once.
+#[derive(Clone, Copy, Debug)]
+pub struct Unpacking<'a> {
+    /// Folder for a temporary file without a name, which is gone when the [`Parts`] are dropped.
+    pub folder: &'a Path,
+    /// Bytes of the folder's disk that stay free. If there are fewer, points are decompressed each time.
+    pub leave: u64,
+}
+
 /// Which points and scans are kept.
 #[derive(Default)]
 struct Chosen {
@@ -94,6 +103,34 @@ pub fn open_parts(path: &Path, options: &ReadOptions, progress: &dyn Progress) -
     open_parts_of(path, options, PART_BYTES, progress)
 }
 
+/// Like [`open_parts`], for points that are read again soon: those of LAZ wait decompressed on a disk.
+///
+/// # Errors
+/// Those of [`open_parts`], and [`Error::Io`] with the folder if temporary files cannot be kept there.
+///
+/// # Examples
+///
+/// ```
+/// use autosplats_cloud::{PointCloud, glam::DVec3};
+/// use autosplats_formats::{ReadOptions, Unpacking, open_parts_unpacked, write};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("scan.laz");
+/// write(&PointCloud::new(DVec3::ZERO, vec![[1.0, 2.0, 3.0]; 5]), &path, &())?;
+/// let unpacking = Unpacking { folder: folder.path(), leave: 1 << 20 };
+/// let parts = open_parts_unpacked(&path, &ReadOptions::default(), unpacking, &())?.ok_or("it has to be read whole")?;
+/// assert_eq!(parts.points(), 5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn open_parts_unpacked(
+    path: &Path,
+    options: &ReadOptions,
+    unpacking: Unpacking<'_>,
+    progress: &dyn Progress,
+) -> Result<Option<Parts>, Error> {
+    open(path, options, PART_BYTES, Some(unpacking), progress)
+}
+
 /// Like [`open_parts`], in parts of about `part` bytes of the file, at least 1.
 ///
 /// # Errors
@@ -104,6 +141,16 @@ pub fn open_parts_of(
     part: usize,
     progress: &dyn Progress,
 ) -> Result<Option<Parts>, Error> {
+    open(path, options, part, None, progress)
+}
+
+fn open(
+    path: &Path,
+    options: &ReadOptions,
+    part: usize,
+    unpacking: Option<Unpacking<'_>>,
+    progress: &dyn Progress,
+) -> Result<Option<Parts>, Error> {
     let io = |source| Error::Io { path: path.into(), source };
     // What is no file can be read only once.
     let metadata = path.metadata().map_err(io)?;
@@ -111,30 +158,32 @@ pub fn open_parts_of(
         return Ok(None);
     }
     let map = Bytes::open(path)?;
-    map.checked(open_mapped(path, &metadata, &map, options, part, progress))
+    let file = |before| Opened::new(path, &metadata, before, part.max(1));
+    map.checked(open_mapped(path, &map, options, file, unpacking, progress))
 }
 
-/// Opens a file whose bytes are mapped.
+/// Opens a file whose bytes are mapped. `file` makes it one to read again, without so many of its first bytes.
 fn open_mapped(
     path: &Path,
-    metadata: &Metadata,
     map: &[u8],
     options: &ReadOptions,
-    part: usize,
+    file: impl FnOnce(usize) -> Opened,
+    unpacking: Option<Unpacking<'_>>,
     progress: &dyn Progress,
 ) -> Result<Option<Parts>, Error> {
     if map.starts_with(GZIP) {
         return Ok(None);
     }
     let Unmarked { bytes: Cow::Borrowed(bytes), .. } = Unmarked::of(map)? else { return Ok(None) };
-    let file = Opened::new(path, metadata, map.len() - bytes.len(), part.max(1));
+    let file = file(map.len() - bytes.len());
     let job = Job { path, progress, bytes, options, triangles: false };
     job.tick(0.0)?;
     let format = registry::format(&job)?;
     let Some((_, open)) = FORMATS.iter().find(|(known, _)| known.name == format.name) else { return Ok(None) };
     let again = options.keep.as_ref().is_some_and(|filter| !filter.is_all());
     let settling = Stage { whole: progress, start: 0.0, len: if again { SETTLING } else { 1.0 }, notes: true };
-    let Some(opening) = open(&Job { progress: &settling, ..job }, &file.reader()?)? else { return Ok(None) };
+    let reader = file.reader()?.unpacking_to(unpacking);
+    let Some(opening) = open(&Job { progress: &settling, ..job }, &reader)? else { return Ok(None) };
     registry::tell_columns(&job, format);
     if let Some(note) = units::scaled(&opening.crs) {
         job.note(note);

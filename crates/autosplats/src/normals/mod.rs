@@ -165,7 +165,7 @@ pub fn estimate_normals(
     progress: &dyn Progress,
 ) -> Result<Normals, Error> {
     check(settings)?;
-    estimate(cloud, settings, None, progress)
+    estimate(cloud, settings, &Scope::default(), progress)
 }
 
 fn check(settings: &NormalSettings) -> Result<(), Error> {
@@ -181,7 +181,8 @@ fn check(settings: &NormalSettings) -> Result<(), Error> {
 /// # Errors
 /// [`Error::TooManyPoints`], and [`Error::Cancelled`] if `progress` says so.
 pub(crate) fn exact_k_radii(cloud: &PointCloud, k: u32, progress: &dyn Progress) -> Result<Vec<f32>, Error> {
-    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, None, progress)?;
+    let Normals { radius, .. } =
+        estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, &Scope::default(), progress)?;
     // The radius of points that are not finite is not either.
     let finite = radius.iter().filter(|radius| radius.is_finite()).count() as u32;
     let of_density = k_radius_of(k.min(finite.saturating_sub(1)));
@@ -193,24 +194,33 @@ fn k_radius_of(k: u32) -> f32 {
     0.5 * (k.max(1) as f32).sqrt()
 }
 
-/// Estimates at a scale at which powers of lengths are exact enough. Outward is away from `middle`, about the cloud's
-/// origin; without one, from that of the cloud.
+/// What is estimated of a cloud that may be a part of another.
+#[derive(Clone, Copy, Default)]
+struct Scope<'a> {
+    /// Outward is away from this place, about the cloud's origin; `None` takes the middle of the cloud.
+    middle: Option<[f32; 3]>,
+    /// Tells by the indices of points that lie close together whether any of them is estimated. Results of the others
+    /// stay NaN. `None` estimates all.
+    wanted: Option<&'a (dyn Fn(&[u32]) -> bool + Sync)>,
+}
+
+/// Estimates at a scale at which powers of lengths are exact enough.
 fn estimate(
     cloud: &PointCloud,
     settings: &NormalSettings,
-    middle: Option<[f32; 3]>,
+    scope: &Scope<'_>,
     progress: &dyn Progress,
 ) -> Result<Normals, Error> {
     let factor = cloud.computing_scale();
     if factor == 1.0 {
-        return estimate_at_scale(cloud, settings, middle, progress);
+        return estimate_at_scale(cloud, settings, scope, progress);
     }
-    let middle = middle.map(|middle| middle.map(|value| (f64::from(value) * factor) as f32));
+    let middle = scope.middle.map(|middle| middle.map(|value| (f64::from(value) * factor) as f32));
     let mut settings = settings.clone();
     if let Orientation::Viewpoints(viewpoints) = &mut settings.orientation {
         viewpoints.iter_mut().for_each(|viewpoint| viewpoint.position *= factor);
     }
-    let mut normals = estimate_at_scale(&cloud.scaled(factor), &settings, middle, progress)?;
+    let mut normals = estimate_at_scale(&cloud.scaled(factor), &settings, &Scope { middle, ..*scope }, progress)?;
     normals.radius.iter_mut().for_each(|radius| *radius = (f64::from(*radius) / factor) as f32);
     Ok(normals)
 }
@@ -218,7 +228,7 @@ fn estimate(
 fn estimate_at_scale(
     cloud: &PointCloud,
     settings: &NormalSettings,
-    middle: Option<[f32; 3]>,
+    scope: &Scope<'_>,
     progress: &dyn Progress,
 ) -> Result<Normals, Error> {
     if u32::try_from(cloud.len()).is_err() {
@@ -228,7 +238,7 @@ fn estimate_at_scale(
     let ticker = Ticker::new(progress);
     ticker.tick(0.0)?;
     let points = finite_points(cloud);
-    let middle = middle.unwrap_or_else(|| {
+    let middle = scope.middle.unwrap_or_else(|| {
         sampled_median(points.len(), |i| {
             let [x, y, z, _] = points[i].0;
             [x, y, z]
@@ -239,7 +249,7 @@ fn estimate_at_scale(
     let sides = sides.about(middle);
     let output = Output::new(cloud.len());
     let k = settings.k.min((tree.len as u32).saturating_sub(1));
-    let job = Job { tree: &tree, sides: &sides, k, output: &output };
+    let job = Job { tree: &tree, sides: &sides, k, wanted: scope.wanted, output: &output };
     let tasks = tree.leaves.len().div_ceil(TASK_LEAVES);
     let done = AtomicUsize::new(0);
     (0..tasks).into_par_iter().try_for_each_init(Scratch::default, |scratch, task| {
@@ -272,6 +282,7 @@ struct Job<'a> {
     sides: &'a Sides,
     /// Less than the number of points.
     k: u32,
+    wanted: Option<&'a (dyn Fn(&[u32]) -> bool + Sync)>,
     output: &'a Output,
 }
 
@@ -280,12 +291,15 @@ struct Job<'a> {
 fn estimate_leaves_with<'a, S: Simd>(simd: S, job: &'a Job<'a>, leaves: Range<usize>, scratch: &'a mut Scratch) {
     scratch.start_task();
     for number in leaves {
+        let leaf = &job.tree.leaves[number];
+        if job.wanted.is_some_and(|wanted| !wanted(&leaf.index[..job.tree.lanes(number)])) {
+            continue;
+        }
         let block = search_leaf(simd, job.tree, number, job.k, scratch);
         let mut fitted = Fitted::default();
         for vector in 0..LANES / S::F32_LANES {
             fitted.fit(simd, &block, vector);
         }
-        let leaf = &job.tree.leaves[number];
         for lane in 0..job.tree.lanes(number) {
             let index = leaf.index[lane];
             let plane = fitted.plane(lane, job.sides.toward(leaf.point(lane), index));

@@ -3,8 +3,8 @@
 //! # How it works
 //! The points are divided into [`Tiles`]. Each is loaded with a halo and estimated like a cloud. A neighbourhood is
 //! exact if it ends where all points are known. The distance to the k-th neighbour among some of the points is never
-//! less than among all, so a halo of that width is enough for a second attempt. Results wait in a file, in the input's
-//! order.
+//! less than among all, so a halo of that width is enough. Only neighbourhoods that may end beyond the first halo are
+//! looked at for it. Results wait in a file, in the input's order.
 //!
 //! The sums over a neighbourhood run in another order than for the whole cloud, so their last bits differ.
 
@@ -16,12 +16,12 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Clouds, Part, PointCloud, Progress, Spill, SpillCell, Tile, Tiles, lock, read_exact_at, temporary_failed,
-    temporary_unnamed, write_all_at,
+    Clouds, Part, PointCloud, Progress, Spill, SpillCell, Tile, TilePoint, Tiles, lock, read_exact_at,
+    temporary_failed, temporary_unnamed, write_all_at,
 };
 use rayon::prelude::*;
 
-use super::{NormalSettings, Normals, Orientation, Viewpoint, check, estimate, k_radius_of};
+use super::{NormalSettings, Normals, Orientation, Scope, Viewpoint, check, estimate, k_radius_of};
 use crate::Error;
 
 /// Memory in bytes per point of a tile and its halo: the point, its neighbourhood, and its result.
@@ -43,8 +43,12 @@ const RUN_BITS: u32 = 18;
 const WAITING: usize = 24;
 const RESULT: usize = 20;
 
-/// Part of the progress that dividing takes.
+/// Part of the progress that dividing takes; and of that of a tile, looking for the halo it needs.
 const DIVIDING: f32 = 0.3;
+const LOOKING: f32 = 0.2;
+
+/// What distances to a neighbour are multiplied by, so that rounding hides none.
+const MARGIN: f32 = 1.001;
 
 /// Points whose results are sorted together.
 const PIECE: usize = 1 << 16;
@@ -144,22 +148,24 @@ impl Work<'_> {
         if self.tiles.count(number) == 0 {
             return Ok(0);
         }
-        let half = Part { whole: progress, start: 0.0, len: 0.5 };
+        let looking = Part { whole: progress, start: 0.0, len: LOOKING };
         let Some(mut tile) = self.first(number)? else {
             let count = self.tiles.count(number);
             let what = format!("{count} points at one place, or nearly so, of which normals are estimated together,");
             return Err(autosplats_cloud::Error::OutOfMemory { what, bytes: (count * BYTES_PER_POINT) as usize }.into());
         };
-        let mut normals = self.estimate(&tile, &half)?;
-        let mut needs = self.needs(number, &tile, &normals);
-        if !needs.is_empty() {
-            let half = Part { whole: progress, start: 0.5, len: 0.5 };
-            if let Some(wider) = self.second(number, &needs)? {
-                normals = self.estimate(&wider, &half)?;
-                tile = wider;
-                needs = self.needs(number, &tile, &normals);
-            }
+        let looked =
+            self.estimate(&tile, &|points| owns(&tile, points) && self.may_need_more(&tile, points), &looking)?;
+        let needs = self.needs(number, &tile, &looked);
+        drop(looked);
+        if !needs.is_empty()
+            && let Some(wider) = self.second(number, &needs)?
+        {
+            tile = wider;
         }
+        let estimating = Part { whole: progress, start: LOOKING, len: 1.0 - LOOKING };
+        let normals = self.estimate(&tile, &|points| owns(&tile, points), &estimating)?;
+        let needs = self.needs(number, &tile, &normals);
         write(&tile, &normals, spill, cells)?;
         progress.tick(1.0)?;
         Ok(needs.len() as u64)
@@ -191,7 +197,24 @@ impl Work<'_> {
         Ok(None)
     }
 
-    fn estimate(&self, tile: &Tile, progress: &dyn Progress) -> Result<Normals, Error> {
+    /// Whether some of these points, which lie close together, may have neighbours that are not known.
+    fn may_need_more(&self, tile: &Tile, points: &[u32]) -> bool {
+        let positions = || points.iter().map(|&point| tile.points[point as usize].position);
+        let [low, high] = [f32::min as fn(f32, f32) -> f32, f32::max]
+            .map(|pick| positions().reduce(|a, b| [0, 1, 2].map(|axis| pick(a[axis], b[axis]))).unwrap_or_default());
+        // Of more than k points, each has k others no further away than the opposite corner of their box.
+        let corner = (0..3).map(|axis| (high[axis] - low[axis]).powi(2)).sum::<f32>().sqrt();
+        let known = |axis: usize| (low[axis] - tile.known[0][axis]).min(tile.known[1][axis] - high[axis]);
+        points.len() <= self.settings.k as usize || !(corner * MARGIN * MARGIN < known(0).min(known(1)).min(known(2)))
+    }
+
+    /// Estimates the points of a tile that lie near one of those that are `wanted`. The others stay NaN.
+    fn estimate(
+        &self,
+        tile: &Tile,
+        wanted: &(dyn Fn(&[u32]) -> bool + Sync),
+        progress: &dyn Progress,
+    ) -> Result<Normals, Error> {
         let positions = tile.points.iter().map(|point| point.position).collect();
         let cloud = PointCloud::new(self.tiles.origin(), positions);
         let orientation = match &self.settings.orientation {
@@ -207,7 +230,8 @@ impl Work<'_> {
             other => other.clone(),
         };
         let settings = NormalSettings { k: self.settings.k, orientation };
-        estimate(&cloud, &settings, Some(self.tiles.middle()), progress)
+        let scope = Scope { middle: Some(self.tiles.middle()), wanted: Some(wanted) };
+        estimate(&cloud, &settings, &scope, progress)
     }
 
     /// The halos that the tile's own points need whose k-th neighbour may be another one, in order.
@@ -216,20 +240,26 @@ impl Work<'_> {
         // With fewer points than neighbours, all others are neighbours.
         let few = tile.points.len() <= self.settings.k as usize && (tile.points.len() as u64) < self.tiles.points();
         let k_radius = k_radius_of(self.settings.k.min(tile.points.len() as u32 - 1));
-        let own = tile.points.par_iter().zip(&normals.radius).filter(|(point, _)| point.is_own);
+        // What was not looked at needs no more.
+        let looked_at = |(point, radius): &(&TilePoint, &f32)| point.is_own && !radius.is_nan();
+        let own = tile.points.par_iter().zip(&normals.radius).filter(looked_at);
         let need = own.filter_map(|(point, radius)| {
             let distance = |to: [[f32; 3]; 2]| {
                 let along = |axis: usize| (point.position[axis] - to[0][axis]).min(to[1][axis] - point.position[axis]);
                 along(0).min(along(1)).min(along(2))
             };
-            // Rounding must not hide a neighbour.
-            let reach = if few { f32::INFINITY } else { radius * k_radius * 1.001 };
+            let reach = if few { f32::INFINITY } else { radius * k_radius * MARGIN };
             (!(reach < distance(tile.known))).then(|| reach - distance([low, high]).min(reach))
         });
         let mut needs: Vec<f32> = need.collect();
         needs.sort_by(f32::total_cmp);
         needs
     }
+}
+
+/// Whether any of these points lies in the tile.
+fn owns(tile: &Tile, points: &[u32]) -> bool {
+    points.iter().any(|&point| tile.points[point as usize].is_own)
 }
 
 /// Adds the results of a tile's own points to those that wait.

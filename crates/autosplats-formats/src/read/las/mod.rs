@@ -26,6 +26,7 @@ mod records;
 mod shape;
 mod slices;
 mod stream;
+mod unpacked;
 
 pub(crate) use self::{
     chunks::MAX_RATIO,

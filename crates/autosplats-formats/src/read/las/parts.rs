@@ -4,6 +4,7 @@
 //!
 //! Opening reads all points once: which fields are zero at every point, whether colours have 8 or 16 bits, and whether
 //! positions need residuals is known only then. So the parts are those of the cloud that reading the whole file gives.
+//! Points may be kept [decompressed](super::unpacked) meanwhile.
 
 use std::{ops::Range, sync::Mutex};
 
@@ -38,8 +39,11 @@ struct LasParts {
 }
 
 /// Opens a file, and reads all points for what they show.
-pub(in super::super) fn open(job: &Job<'_>, _file: &Reader<'_>) -> Result<Option<Opening>, Error> {
-    let Some(stream) = Stream::open(job.path)? else { return Ok(None) };
+pub(in super::super) fn open(job: &Job<'_>, file: &Reader<'_>) -> Result<Option<Opening>, Error> {
+    let Some(mut stream) = Stream::open(job.path)? else { return Ok(None) };
+    if let Some(unpacking) = file.unpacking() {
+        stream.unpack_to(unpacking)?;
+    }
     let Opened { header, dimensions, lost, crs, origin, notes: [notes, after], .. } =
         super::open(job, &Shape::default())?;
     let (claimed, points) = (header.points, stream.facts.points);

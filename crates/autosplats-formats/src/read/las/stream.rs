@@ -14,7 +14,7 @@ use std::{
     time::SystemTime,
 };
 
-use autosplats_cloud::{Bytes, Crs, Error, check_memory, guard, read_exact_at};
+use autosplats_cloud::{Bytes, Crs, Error, check_memory, free_disk, guard, read_exact_at};
 use glam::DVec3;
 use laz::DecompressionSelection;
 
@@ -26,14 +26,15 @@ use super::{
     header::Header,
     laz::{Compressed, Layout, decompress},
     records::Records,
+    unpacked::Unpacked,
 };
 use crate::{
     las::{self, EXTRA_DESCRIPTOR},
-    read::ReadOptions,
+    read::{ReadOptions, parts::Unpacking},
 };
 
-/// Records of a run of an uncompressed file.
-const PIECE: usize = 1 << 16;
+/// Records of a run of an uncompressed file, and of a piece of a long run.
+pub(super) const PIECE: usize = 1 << 16;
 
 /// Longest chunk of which all records are decompressed before any is passed on, so that a damaged one is left out
 /// whole.
@@ -50,6 +51,7 @@ pub(crate) struct Stream {
     pub(crate) facts: Facts,
     layout: Option<Layout>,
     runs: Vec<Run>,
+    unpacked: Option<Unpacked>,
 }
 
 /// What the header and the records say.
@@ -89,7 +91,7 @@ pub(crate) struct Space {
 }
 
 /// Points that cannot be read, and why.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Lost {
     pub(crate) points: u64,
     pub(crate) why: String,
@@ -170,7 +172,20 @@ impl Stream {
             notes,
             cut: cut_off(lost, header.points),
         };
-        Ok(Self { path: path.into(), stamp, facts, layout, runs })
+        Ok(Self { path: path.into(), stamp, facts, layout, runs, unpacked: None })
+    }
+
+    /// Keeps what is decompressed, if the disk has room, so that this is done once.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn unpack_to(&mut self, Unpacking { folder, leave }: Unpacking<'_>) -> Result<(), Error> {
+        let len = self.facts.record_len;
+        let bytes = self.facts.points.saturating_mul(len as u64).saturating_add(leave);
+        if self.layout.is_some() && free_disk(folder).is_none_or(|free| free >= bytes) {
+            self.unpacked = Some(Unpacked::new(folder, len, self.runs.iter().map(|run| run.points))?);
+        }
+        Ok(())
     }
 
     /// Number of runs.
@@ -199,9 +214,15 @@ impl Stream {
             || Error::malformed(&self.path, "size or time", "the file changed while it was read; start again");
         let check = || if stamp(&file).map_err(io)? == self.stamp { Ok(()) } else { Err(changed()) };
         check()?;
-        let run = &self.runs[run];
-        let len = run.bytes.end - run.bytes.start;
         let Space { packed, records } = space;
+        if let Some(unpacked) = &self.unpacked
+            && let Some(lost) = unpacked.read(run, records, take)?
+        {
+            return Ok(lost);
+        }
+        let number = run;
+        let run = &self.runs[number];
+        let len = run.bytes.end - run.bytes.start;
         let map;
         let bytes = if len > MAX_READ {
             map = Bytes::open(&self.path)?;
@@ -212,12 +233,15 @@ impl Stream {
                 .map_err(|source| if source.kind() == ErrorKind::UnexpectedEof { changed() } else { io(source) })?;
             packed
         };
-        let lost = match &self.layout {
-            None => {
+        let lost = match (&self.layout, &self.unpacked) {
+            (None, _) => {
                 take(bytes)?;
                 Lost::default()
             }
-            Some(layout) => self.unpack(layout, bytes, run, records, take)?,
+            (Some(layout), None) => self.unpack(layout, bytes, run, records, take)?,
+            (Some(layout), Some(unpacked)) => {
+                unpacked.keep(number, |take| self.unpack(layout, bytes, run, records, take), take)?
+            }
         };
         check()?;
         Ok(lost)

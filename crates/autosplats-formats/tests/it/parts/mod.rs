@@ -6,7 +6,9 @@ use std::{
 };
 
 use autosplats_cloud::{Clouds, Error, FieldValues, PointCloud, PointFilter, Progress, Scan, glam::DVec3};
-use autosplats_formats::{ReadOptions, open_parts, open_parts_of, read_with, write};
+use autosplats_formats::{
+    Parts, ReadOptions, Unpacking, open_parts, open_parts_of, open_parts_unpacked, read_with, write,
+};
 
 use crate::common::{positions, shared_data};
 
@@ -96,16 +98,41 @@ fn assert_same(found: &PointCloud, expected: &PointCloud, what: &str) {
     assert_eq!(joined(found.scans()), joined(expected.scans()), "{what}: scans that have points");
 }
 
+/// How a file is read in parts.
+#[derive(Clone, Copy, Debug)]
+enum How {
+    /// So many bytes at a time.
+    Bytes(usize),
+    /// The usual number, decompressed once. So many bytes of the disk stay free.
+    Unpacked(u64),
+}
+
+impl How {
+    fn open(self, path: &Path, options: &ReadOptions, notes: &Notes) -> Result<Option<Parts>, Error> {
+        match self {
+            Self::Bytes(size) => open_parts_of(path, options, size, notes),
+            Self::Unpacked(leave) => {
+                let unpacking = Unpacking { folder: &std::env::temp_dir(), leave };
+                open_parts_unpacked(path, options, unpacking, notes)
+            }
+        }
+    }
+}
+
 /// Compares a file in parts of each size with the whole. Returns false if it has to be read whole.
 fn check(path: &Path, options: &ReadOptions) -> bool {
     let notes = Notes::default();
     let whole = read_with(path, options, &notes);
     let notes = notes.sorted();
     let len = std::fs::metadata(path).unwrap().len();
-    for size in SIZES.into_iter().filter(|size| len < 1000 * *size as u64) {
-        let what = format!("{} in parts of {size} bytes, {options:?}", path.display());
+    let sizes = SIZES.into_iter().filter(|size| len < 1000 * *size as u64).map(How::Bytes);
+    // No disk leaves as much free as the second states, so LAZ is decompressed each time.
+    let is_laz = path.extension().is_some_and(|extension| extension == "laz");
+    let unpacked = [0, u64::MAX].map(How::Unpacked).into_iter().filter(|_| is_laz);
+    for how in sizes.chain(unpacked) {
+        let what = format!("{} in parts of {how:?}, {options:?}", path.display());
         let own = Notes::default();
-        let parts = match (open_parts_of(path, options, size, &own), &whole) {
+        let parts = match (how.open(path, options, &own), &whole) {
             (Ok(None), _) => {
                 assert_eq!(own.sorted(), [""; 0], "{what}: notes of what is read whole");
                 return false;
@@ -120,7 +147,9 @@ fn check(path: &Path, options: &ReadOptions) -> bool {
         let whole = whole.as_ref().unwrap_or_else(|error| panic!("{what}: no error, but {error}"));
         assert_eq!(own.sorted(), notes, "{what}: notes");
         // Parts are the same each time.
-        for _ in 0..if size == SIZES[1] && len < 100_000 { 2 } else { 1 } {
+        let twice =
+            matches!(how, How::Bytes(size) if size == SIZES[1] && len < 100_000) || matches!(how, How::Unpacked(0));
+        for _ in 0..if twice { 2 } else { 1 } {
             let again = Notes::default();
             let mut clouds = Vec::new();
             parts
@@ -206,6 +235,26 @@ fn what_is_no_file_of_points_in_parts_is_read_whole_or_fails_alike() {
         check_bytes("bad.ply", bytes);
         check_bytes("bad.xyz", bytes);
     }
+}
+
+/// Whole, damaged in the middle, cut off, and without a table of its three chunks.
+#[test]
+fn compressed_files_are_decompressed_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.laz");
+    let count = 120_000;
+    let colors = (0..count).map(|i| [i as u8, (i >> 8) as u8, 7]).collect();
+    let classes = FieldValues::U8((0..count).map(|i| (i % 5) as u8).collect());
+    let cloud = PointCloud::new(DVec3::new(5e5, 5e6, 0.0), positions(count)).with_colors(colors).unwrap();
+    write(&cloud.with_field("Classification", classes).unwrap(), &path, &()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    assert!(check_bytes("a.laz", &bytes) && check_bytes_with("a.laz", &bytes, &filters()));
+    let mut damaged = bytes.clone();
+    let middle = bytes.len() / 2;
+    damaged[middle..middle + 2000].fill(255);
+    assert!(check_bytes("damaged.laz", &damaged));
+    assert!(check_bytes("cut.laz", &bytes[..middle + 1000]));
+    assert!(check_bytes("tableless.laz", &bytes[..bytes.len() - 3]));
 }
 
 #[test]
