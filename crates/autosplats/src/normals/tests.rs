@@ -162,7 +162,7 @@ fn vectors_of_any_width_give_the_same_bits() {
         let run = |scalar: bool| {
             let output = Output::new(cloud.len());
             let k = 10.min((tree.len as u32).saturating_sub(1));
-            let job = Job { tree: &tree, sides: &sides, k, output: &output };
+            let job = Job { tree: &tree, sides: &sides, k, wanted: None, output: &output };
             let leaves = 0..tree.leaves.len();
             match scalar {
                 true => estimate_leaves_with(pulp::Scalar, &job, leaves, &mut Scratch::default()),
