@@ -194,14 +194,16 @@ fn k_radius_of(k: u32) -> f32 {
     0.5 * (k.max(1) as f32).sqrt()
 }
 
+/// Tells by the indices of points that lie close together whether any of them is estimated.
+type Wanted<'a> = &'a (dyn Fn(&[u32]) -> bool + Sync);
+
 /// What is estimated of a cloud that may be a part of another.
 #[derive(Clone, Copy, Default)]
 struct Scope<'a> {
     /// Outward is away from this place, about the cloud's origin; `None` takes the middle of the cloud.
     middle: Option<[f32; 3]>,
-    /// Tells by the indices of points that lie close together whether any of them is estimated. Results of the others
-    /// stay NaN. `None` estimates all.
-    wanted: Option<&'a (dyn Fn(&[u32]) -> bool + Sync)>,
+    /// Results of points that are not wanted stay NaN. `None` estimates all.
+    wanted: Option<Wanted<'a>>,
 }
 
 /// Estimates at a scale at which powers of lengths are exact enough.
@@ -282,7 +284,7 @@ struct Job<'a> {
     sides: &'a Sides,
     /// Less than the number of points.
     k: u32,
-    wanted: Option<&'a (dyn Fn(&[u32]) -> bool + Sync)>,
+    wanted: Option<Wanted<'a>>,
     output: &'a Output,
 }
 

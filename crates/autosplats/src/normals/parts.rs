@@ -21,7 +21,7 @@ use autosplats_cloud::{
 };
 use rayon::prelude::*;
 
-use super::{NormalSettings, Normals, Orientation, Scope, Viewpoint, check, estimate, k_radius_of};
+use super::{NormalSettings, Normals, Orientation, Scope, Viewpoint, Wanted, check, estimate, k_radius_of};
 use crate::Error;
 
 /// Memory in bytes per point of a tile and its halo: the point, its neighbourhood, and its result.
@@ -209,12 +209,7 @@ impl Work<'_> {
     }
 
     /// Estimates the points of a tile that lie near one of those that are `wanted`. The others stay NaN.
-    fn estimate(
-        &self,
-        tile: &Tile,
-        wanted: &(dyn Fn(&[u32]) -> bool + Sync),
-        progress: &dyn Progress,
-    ) -> Result<Normals, Error> {
+    fn estimate(&self, tile: &Tile, wanted: Wanted<'_>, progress: &dyn Progress) -> Result<Normals, Error> {
         let positions = tile.points.iter().map(|point| point.position).collect();
         let cloud = PointCloud::new(self.tiles.origin(), positions);
         let orientation = match &self.settings.orientation {
