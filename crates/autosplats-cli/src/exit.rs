@@ -1,6 +1,8 @@
 //! Failures: one line on standard error, and an exit code for the kind.
 
 use std::fmt::Display;
+use std::io;
+use std::path::Path;
 
 use autosplats_cloud::ErrorKind;
 use autosplats_scenes::Scene;
@@ -63,6 +65,11 @@ impl Failure {
 
     pub(crate) fn usage(message: impl Display) -> Self {
         Self::new(Exit::Usage, message)
+    }
+
+    /// The failure of temporary files in a folder.
+    pub(crate) fn temporary(folder: &Path, source: &io::Error) -> Self {
+        Self::new(Exit::Output, format!("{}: {source}", folder.display()))
     }
 
     pub(crate) fn interrupted() -> Self {

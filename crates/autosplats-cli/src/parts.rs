@@ -164,14 +164,9 @@ impl From<autosplats::Error> for WorkError {
 pub(crate) fn failure(error: Error, output: &Path, temp: &Path) -> Failure {
     match &error {
         Error::Io { path, source } if path == output => cannot_write(output, source),
-        Error::Io { path, source } if path == temp => temporary_failure(temp, source),
+        Error::Io { path, source } if path == temp => Failure::temporary(temp, source),
         Error::OutOfMemory { .. } => Failure::new(Exit::Memory, error),
         Error::Cancelled => Failure::interrupted(),
         _ => Failure::from(error),
     }
-}
-
-/// The failure of temporary files in a folder.
-pub(crate) fn temporary_failure(temp: &Path, source: &std::io::Error) -> Failure {
-    Failure::new(Exit::Output, format!("{}: {source}", temp.display()))
 }

@@ -15,7 +15,6 @@ use autosplats_sources::{Input, Source};
 use super::{Inputs, differences, failure, is_made, read_whole};
 use crate::console::Console;
 use crate::exit::{Exit, Failure};
-use crate::parts::temporary_failure;
 
 /// Points of a scene that are generated at a time.
 const SCENE_PART: usize = 1 << 20;
@@ -57,7 +56,7 @@ impl Inputs {
                     console.note(format!("{}: --keep {filter} leaves none of its {points} points", input.name));
                 }
                 Err(Error::Io { path, source }) if unpacking.is_some_and(|to| to.folder == path) => {
-                    return Err(temporary_failure(&path, &source));
+                    return Err(Failure::temporary(&path, &source));
                 }
                 Err(error) => return Err(failure(input, error)),
             }

@@ -50,8 +50,9 @@ use self::job::{Format, Job, MAX_HEADER_LINE};
 pub use self::{
     columns::check_columns,
     describe::{Attribute, Description},
+    opened::Unpacking,
     options::ReadOptions,
-    parts::{Parts, Unpacking, open_parts, open_parts_of, open_parts_unpacked},
+    parts::{Parts, open_parts, open_parts_of, open_parts_unpacked},
     registry::{
         check_not_lfs_pointer, describe, describe_bytes, files_beside, formats, gltf_animation, is_named_as_points,
         read, read_bytes, read_gltf_at, read_marked, read_mesh, read_mesh_bytes, read_with,

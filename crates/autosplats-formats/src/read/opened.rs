@@ -10,7 +10,14 @@ use std::{
 
 use autosplats_cloud::{Error, read_exact_at, reserving};
 
-use super::parts::Unpacking;
+/// Where points of a compressed file wait, so that they are decompressed once.
+#[derive(Clone, Copy, Debug)]
+pub struct Unpacking<'a> {
+    /// Folder for a temporary file without a name, which is gone when the [`Parts`](super::Parts) are dropped.
+    pub folder: &'a Path,
+    /// Bytes of the folder's disk that stay free. If there are fewer, points are decompressed each time.
+    pub leave: u64,
+}
 
 /// A file that is read again and again, and must not change meanwhile.
 pub(super) struct Opened {

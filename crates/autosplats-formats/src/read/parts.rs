@@ -16,7 +16,7 @@ use super::{
     e57,
     job::{Format, Job},
     las,
-    opened::{Opened, Reader},
+    opened::{Opened, Reader, Unpacking},
     pcd,
     pieces::{Opening, Pieces, Seen},
     ply, registry,
@@ -51,15 +51,6 @@ pub struct Parts {
     pieces: Box<dyn Pieces>,
     chosen: Chosen,
     points: usize,
-}
-
-/// Where points of a compressed file wait, so that they are decompressed once.
-#[derive(Clone, Copy, Debug)]
-pub struct Unpacking<'a> {
-    /// Folder for a temporary file without a name, which is gone when the [`Parts`] are dropped.
-    pub folder: &'a Path,
-    /// Bytes of the folder's disk that stay free. If there are fewer, points are decompressed each time.
-    pub leave: u64,
 }
 
 /// Which points and scans are kept.

@@ -11,7 +11,7 @@
 //! (`imports/splat.wgsl`, `imports/patch.wgsl`). The centres for trimming are counted in integers, again independent of
 //! the order.
 
-use super::layers::{Channels, LayerBuffers};
+use super::layers::{Channels, LayerBuffers, PATCH};
 use super::trim::blurred::{self, BLOCK_PX};
 use super::trim::{self, ACROSS, LINES, OWN_SIXTEENTHS, SIDES};
 use super::{centers, raster, setup};
@@ -89,8 +89,7 @@ passes! {
 
 /// Most pixels of a splat's bounds whose rows one workgroup shares out among its invocations.
 const MAX_GROUP_PX: u32 = 1024;
-/// Columns and rows of a patch, and splats that are drawn into it at a time.
-const PATCH: [u32; 2] = [16, 32];
+/// Splats that are drawn into a patch at a time.
 const BATCH: u32 = 64;
 /// Side in pixels of the square that a workgroup trims.
 const SQUARE: u32 = 32;
@@ -322,11 +321,6 @@ fn cells([columns, rows]: [u32; 2]) -> u32 {
 /// Blocks of pixels in a picture of this size.
 fn block_count(size: [u32; 2]) -> u32 {
     size.map(|side| side.div_ceil(BLOCK_PX as u32)).iter().product()
-}
-
-/// Patches of a picture of this size.
-pub(super) fn patch_count(size: [u32; 2]) -> usize {
-    std::array::from_fn::<usize, 2, _>(|axis| size[axis].div_ceil(PATCH[axis]) as usize).iter().product()
 }
 
 /// Workgroups for rectangles of this many columns and rows.

@@ -2,7 +2,6 @@
 
 use autosplats_cloud::ValueOrigin;
 
-use super::gpu::patch_count;
 use super::{GBuffer, TILE_AREA, Tiles};
 use crate::Error;
 use crate::camera::View;
@@ -133,6 +132,9 @@ impl GBuffer {
     }
 }
 
+/// Columns and rows of a patch of pixels, which a workgroup of the device draws.
+pub(super) const PATCH: [u32; 2] = [16, 32];
+
 /// [`GBuffer`] on the device, row by row.
 #[derive(Debug)]
 pub(crate) struct LayerBuffers {
@@ -173,11 +175,12 @@ impl LayerBuffers {
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2], channels: Channels) -> Result<Self, Error> {
         let pixels = size[0] as usize * size[1] as usize;
+        let patches = [0, 1].map(|axis| size[axis].div_ceil(PATCH[axis]) as usize);
         Ok(Self {
             size,
             channels,
             surface: gpu.storage::<[f32; 4]>("normals and depths", pixels)?,
-            cover: gpu.storage::<Cover>("cover of pixels", pixels + patch_count(size))?,
+            cover: gpu.storage::<Cover>("cover of pixels", pixels + patches[0] * patches[1])?,
             extras: gpu.storage::<[f32; 4]>("colours and measures", channels.planes() * pixels)?,
         })
     }

@@ -26,15 +26,15 @@ use super::{
     header::Header,
     laz::{Compressed, Layout, decompress},
     records::Records,
-    unpacked::Unpacked,
+    unpacked::{Lost, Unpacked},
 };
 use crate::{
     las::{self, EXTRA_DESCRIPTOR},
-    read::{ReadOptions, parts::Unpacking},
+    read::{ReadOptions, opened::Unpacking},
 };
 
 /// Records of a run of an uncompressed file, and of a piece of a long run.
-pub(super) const PIECE: usize = 1 << 16;
+const PIECE: usize = 1 << 16;
 
 /// Longest chunk of which all records are decompressed before any is passed on, so that a damaged one is left out
 /// whole.
@@ -88,13 +88,6 @@ struct Run {
 pub(crate) struct Space {
     packed: Vec<u8>,
     records: Vec<u8>,
-}
-
-/// Points that cannot be read, and why.
-#[derive(Clone, Default)]
-pub(crate) struct Lost {
-    pub(crate) points: u64,
-    pub(crate) why: String,
 }
 
 impl Stream {

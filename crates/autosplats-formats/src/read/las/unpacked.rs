@@ -13,7 +13,15 @@ use std::{
 
 use autosplats_cloud::{Error, read_exact_at, temporary_failed, temporary_unnamed, write_all_at};
 
-use super::stream::{Lost, PIECE};
+/// Records that are passed on at a time.
+const PIECE: usize = 1 << 16;
+
+/// Points that cannot be read, and why.
+#[derive(Clone, Default)]
+pub(crate) struct Lost {
+    pub(crate) points: u64,
+    pub(crate) why: String,
+}
 
 /// Records of a file, decompressed.
 pub(super) struct Unpacked {

@@ -60,8 +60,8 @@ fn own_offset(local: u32) -> vec2u {
     return vec2u(local % PATCH.x, OWN_ROWS * (local / PATCH.x));
 }
 
-// Draws all living splats into the patch with first pixel `corner`. Returns whether any meets it. Loops break at their end: most patches need a
-// single pass, and software devices pay for a pass that only ends a loop.
+// Draws all living splats into the patch with first pixel `corner`. Returns whether any meets it. Loops break at their
+// end: most patches need a single pass, and software devices pay for a pass that only ends a loop.
 fn draw_patch(corner: vec2u, local: u32) -> bool {
     let end = tree[0].x;
     if local < 2u * HIT_WORDS {
