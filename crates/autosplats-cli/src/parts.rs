@@ -23,7 +23,7 @@ const TREE_MEMORY: u64 = 256 << 20;
 /// Points that a sample has at most, if their number is known.
 const SAMPLE: u64 = 1 << 17;
 
-/// Those points of a part that are in the sample which stands for all of `clouds`.
+/// The points of a part that belong to the sample of `clouds`.
 pub(crate) fn sample_of(part: &PointCloud, clouds: &dyn Clouds) -> PointCloud {
     let step = clouds.points().unwrap_or(u64::from(u32::MAX)).div_ceil(SAMPLE).max(1);
     let points: Vec<u32> = (0..part.len() as u32).step_by(step as usize).collect();

@@ -121,7 +121,7 @@ impl Spool {
         Ok(())
     }
 
-    /// Reads a part into a cloud of another one, whose memory is used again.
+    /// Reads what is stored into `part`, and uses its memory again.
     fn load(&self, stored: &Stored, part: &mut PointCloud) -> Result<(), Error> {
         fn sized<T: Copy + Default + bytemuck::Pod>(values: &mut Vec<T>, len: usize) -> &mut [u8] {
             values.resize(len, T::default());

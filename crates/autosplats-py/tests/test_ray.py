@@ -222,6 +222,27 @@ def test_a_task_ends_with_its_mark(tmp_path):
     assert time.monotonic() - began < 15
 
 
+def test_a_task_ends_with_its_mark_in_a_worker(cluster, tmp_path):
+    mark, begun = tmp_path / "mark", tmp_path / "begun"
+    mark.touch()
+
+    @ray.remote(max_retries=0)
+    def is_interrupted() -> bool:
+        try:
+            with engine._while_there(str(mark)):
+                begun.touch()
+                time.sleep(60)
+        except KeyboardInterrupt:
+            return True
+        return False
+
+    running = is_interrupted.remote()
+    while not begun.exists():
+        time.sleep(0.05)
+    mark.unlink()
+    assert ray.get(running, timeout=30)
+
+
 def test_bad_usage(cluster, tiles, tmp_path):
     with pytest.raises(autosplats.ArgumentError, match="connected to a cluster already"):
         run(jobs.tile_normals(tiles, tmp_path / "out"), address="auto")

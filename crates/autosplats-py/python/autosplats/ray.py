@@ -21,7 +21,7 @@ import threading
 import time
 import uuid
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -158,6 +158,7 @@ class _Engine:
         waiting = list(reversed(tasks))
         running: dict[str, _Running] = {}
         of_copy: dict[Any, str] = {}
+        late: list[Any] = []
         self._paces.clear()
         looked = -math.inf
         slots = 0
@@ -200,11 +201,13 @@ class _Engine:
                     del running[name]
                     for other in one.copies:
                         of_copy.pop(other)
-                    self._cancel(one.copies)
+                        self._unmark(other)
+                    late += one.copies
                     self._run.add(row)
         except BaseException:
-            self._cancel(list(of_copy))
+            self._cancel([*of_copy, *late])
             raise
+        self._cancel(late)
 
     def _row(self, one: _Running, copy: Any) -> Row | None:
         """What has become of a task, by one of its copies; None if another may still do it."""
@@ -225,7 +228,11 @@ class _Engine:
             self._ray.wait(list(copies), num_returns=len(copies), timeout=_END)
 
     def _unmark(self, copy: Any) -> None:
-        self._marks.pop(copy).unlink(missing_ok=True)
+        mark = self._marks.pop(copy, None)
+        if mark is not None:
+            # A share that fails keeps no other task from its end; the file goes with its folder.
+            with suppress(OSError):
+                mark.unlink(missing_ok=True)
 
     def _slots(self) -> int:
         """How many tasks can run at once."""
@@ -282,12 +289,17 @@ def _while_there(path: str) -> Iterator[None]:
                 return
 
     thread = threading.Thread(target=watch, daemon=True)
+    # Ray starts its workers with this signal blocked.
+    can_mask = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT}) if can_mask else set()
     thread.start()
     try:
         yield
     finally:
         over.set()
         thread.join()
+        if can_mask:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _interrupt(main_thread: int) -> None:

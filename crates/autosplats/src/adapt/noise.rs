@@ -16,7 +16,7 @@ use crate::project::DensityGrid;
 
 /// Expected number of sampled surfels; with no more surfels than this, nearly all are sampled.
 pub(crate) const NOISE_SAMPLE_COUNT: usize = 1024;
-/// Largest number of sampled surfels. The number varies by chance, by about thirty.
+/// Largest number of sampled surfels. The number varies by chance, by about forty.
 pub(crate) const MOST_SAMPLED: usize = NOISE_SAMPLE_COUNT + NOISE_SAMPLE_COUNT / 2;
 /// Least ratio of the median k-radius of the sample's sparsest third to that of its densest third at which growth of
 /// noise is estimated. Growth counts more the larger the ratio. Random points reach 1.2 by chance, very noisy ones 1.7.

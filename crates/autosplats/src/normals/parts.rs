@@ -12,7 +12,10 @@ use std::{
     fs::File,
     ops::Range,
     path::{Path, PathBuf},
-    sync::Mutex,
+    sync::{
+        Mutex,
+        atomic::{AtomicBool, Ordering::Relaxed},
+    },
 };
 
 use autosplats_cloud::{
@@ -43,8 +46,9 @@ const RUN_BITS: u32 = 18;
 const WAITING: usize = 24;
 const RESULT: usize = 20;
 
-/// Part of the progress that dividing takes; and of that of a tile, looking for the halo it needs.
+/// Part of the progress that dividing takes.
 const DIVIDING: f32 = 0.3;
+/// Part of a tile's progress that looking for the halo takes.
 const LOOKING: f32 = 0.2;
 
 /// What distances to a neighbour are multiplied by, so that rounding hides none.
@@ -154,18 +158,28 @@ impl Work<'_> {
             let what = format!("{count} points at one place, or nearly so, of which normals are estimated together,");
             return Err(autosplats_cloud::Error::OutOfMemory { what, bytes: (count * BYTES_PER_POINT) as usize }.into());
         };
-        let looked =
-            self.estimate(&tile, &|points| owns(&tile, points) && self.may_need_more(&tile, points), &looking)?;
-        let needs = self.needs(number, &tile, &looked);
-        drop(looked);
-        if !needs.is_empty()
-            && let Some(wider) = self.second(number, &needs)?
-        {
-            tile = wider;
-        }
-        let estimating = Part { whole: progress, start: LOOKING, len: 1.0 - LOOKING };
-        let normals = self.estimate(&tile, &|points| owns(&tile, points), &estimating)?;
-        let needs = self.needs(number, &tile, &normals);
+        let skipped = AtomicBool::new(false);
+        let is_looked_at = |points: &[u32]| {
+            let may_need_more = self.may_need_more(&tile, points);
+            skipped.fetch_or(!may_need_more, Relaxed);
+            may_need_more
+        };
+        let looked = self.estimate(&tile, &|points| owns(&tile, points) && is_looked_at(points), &looking)?;
+        let mut needs = self.needs(number, &tile, &looked);
+        let normals = if needs.is_empty() && !skipped.into_inner() {
+            looked
+        } else {
+            drop(looked);
+            if !needs.is_empty()
+                && let Some(wider) = self.second(number, &needs)?
+            {
+                tile = wider;
+            }
+            let estimating = Part { whole: progress, start: LOOKING, len: 1.0 - LOOKING };
+            let normals = self.estimate(&tile, &|points| owns(&tile, points), &estimating)?;
+            needs = self.needs(number, &tile, &normals);
+            normals
+        };
         write(&tile, &normals, spill, cells)?;
         progress.tick(1.0)?;
         Ok(needs.len() as u64)
@@ -208,7 +222,7 @@ impl Work<'_> {
         points.len() <= self.settings.k as usize || !(corner * MARGIN * MARGIN < known(0).min(known(1)).min(known(2)))
     }
 
-    /// Estimates the points of a tile that lie near one of those that are `wanted`. The others stay NaN.
+    /// Estimates the points of a tile in the leaves that `wanted` accepts. The others stay NaN.
     fn estimate(&self, tile: &Tile, wanted: Wanted<'_>, progress: &dyn Progress) -> Result<Normals, Error> {
         let positions = tile.points.iter().map(|point| point.position).collect();
         let cloud = PointCloud::new(self.tiles.origin(), positions);

@@ -18,7 +18,7 @@ fn clear_lines(local: u32) {
     workgroupBarrier();
 }
 
-// Tells the number of lines of an invocation's splat, one for each of its rows. A screen has less than 2¹⁵ rows.
+// Tells the number of lines of an invocation's splat, one for each of its rows. A screen has fewer than 2¹⁵ rows.
 fn tell_lines(rows: u32, local: u32) {
     let told = atomicAdd(&lines_told, (1u << LINE_BITS) | rows);
     line_splats[told >> LINE_BITS] = local;

@@ -1,8 +1,8 @@
 // Attribute pass: the weighted mean of all living splats within ε of the depth map, and the rims for the trim [Paper,
 // §7].
 //
-// Reads: linear, splats, tree, surfels, values, depth_map. Writes: surface, cover, extras; not again where a patch was
-// and stays empty.
+// Reads: linear, splats, tree, surfels, values, depth_map. Writes: surface, extras; reads and writes: cover. Does not
+// write again where a patch was and stays empty.
 
 #import frame
 #import depth_map
@@ -34,6 +34,8 @@ override SCALAR_SLOTS: u32;
 override MEASURE_SLOTS: u32;
 override BACK_SLOTS: u32;
 
+// What an earlier frame told of the patch.
+var<workgroup> was_left_empty: bool;
 var<workgroup> normals: array<vec3f, BATCH>;
 var<workgroup> sources: array<u32, BATCH>;
 var<workgroup> reaches: array<f32, BATCH>;
@@ -179,9 +181,12 @@ fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     begin(&upper, pixel);
     begin(&lower, pixel + vec2u(0u, 4u));
     let mark = patch_mark(corner);
-    let was_left_empty = cover[mark].point == LEFT_EMPTY;
+    if local == 0u {
+        was_left_empty = cover[mark].point == LEFT_EMPTY;
+    }
+    let is_left_empty = workgroupUniformLoad(&was_left_empty);
     let is_met = draw_patch(corner, local);
-    if was_left_empty && !is_met {
+    if is_left_empty && !is_met {
         return;
     }
     end(&upper, pixel);

@@ -166,7 +166,7 @@ impl LayerBuffers {
     /// Whether the device can bind the buffers of [`new`](Self::new).
     pub(crate) fn has_room(gpu: &Gpu, size: [u32; 2], channels: Channels) -> bool {
         let pixels = size[0] as usize * size[1] as usize;
-        gpu.binds::<[f32; 4]>(channels.planes().max(1) * pixels)
+        gpu.binds::<[f32; 4]>((channels.planes() * pixels).max(pixels + patch_count(size)))
     }
 
     /// Buffers for a screen of `size`.
@@ -175,12 +175,11 @@ impl LayerBuffers {
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2], channels: Channels) -> Result<Self, Error> {
         let pixels = size[0] as usize * size[1] as usize;
-        let patches = [0, 1].map(|axis| size[axis].div_ceil(PATCH[axis]) as usize);
         Ok(Self {
             size,
             channels,
             surface: gpu.storage::<[f32; 4]>("normals and depths", pixels)?,
-            cover: gpu.storage::<Cover>("cover of pixels", pixels + patches[0] * patches[1])?,
+            cover: gpu.storage::<Cover>("cover of pixels", pixels + patch_count(size))?,
             extras: gpu.storage::<[f32; 4]>("colours and measures", channels.planes() * pixels)?,
         })
     }
@@ -236,6 +235,12 @@ impl LayerBuffers {
         }
         layers
     }
+}
+
+/// Patches of a screen of `size`.
+fn patch_count(size: [u32; 2]) -> usize {
+    let [columns, rows] = [0, 1].map(|axis| size[axis].div_ceil(PATCH[axis]) as usize);
+    columns * rows
 }
 
 /// Uploads the host's layers.

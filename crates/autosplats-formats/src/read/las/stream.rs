@@ -26,15 +26,12 @@ use super::{
     header::Header,
     laz::{Compressed, Layout, decompress},
     records::Records,
-    unpacked::{Lost, Unpacked},
+    unpacked::{Lost, PIECE, Unpacked},
 };
 use crate::{
     las::{self, EXTRA_DESCRIPTOR},
     read::{ReadOptions, opened::Unpacking},
 };
-
-/// Records of a run of an uncompressed file, and of a piece of a long run.
-const PIECE: usize = 1 << 16;
 
 /// Longest chunk of which all records are decompressed before any is passed on, so that a damaged one is left out
 /// whole.
@@ -233,10 +230,18 @@ impl Stream {
             }
             (Some(layout), None) => self.unpack(layout, bytes, run, records, take)?,
             (Some(layout), Some(unpacked)) => {
-                unpacked.keep(number, |take| self.unpack(layout, bytes, run, records, take), take)?
+                let mut at = unpacked.start(number);
+                let keep = &mut |records: &[u8]| {
+                    unpacked.keep(&mut at, records);
+                    take(records)
+                };
+                self.unpack(layout, bytes, run, records, keep)?
             }
         };
         check()?;
+        if let Some(unpacked) = &self.unpacked {
+            unpacked.finish(number, &lost);
+        }
         Ok(lost)
     }
 

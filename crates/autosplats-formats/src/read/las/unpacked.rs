@@ -8,13 +8,16 @@
 use std::{
     fs::File,
     path::{Path, PathBuf},
-    sync::OnceLock,
+    sync::{
+        OnceLock,
+        atomic::{AtomicBool, Ordering::Relaxed},
+    },
 };
 
 use autosplats_cloud::{Error, read_exact_at, temporary_failed, temporary_unnamed, write_all_at};
 
-/// Records that are passed on at a time.
-const PIECE: usize = 1 << 16;
+/// Records of a run of an uncompressed file, and of a piece of a long run that is passed on in pieces.
+pub(super) const PIECE: usize = 1 << 16;
 
 /// Points that cannot be read, and why.
 #[derive(Clone, Default)]
@@ -29,6 +32,8 @@ pub(super) struct Unpacked {
     file: File,
     record_len: usize,
     runs: Vec<Kept>,
+    /// Whether the disk has no room for more.
+    is_full: AtomicBool,
 }
 
 /// Where the records of a run are.
@@ -49,7 +54,13 @@ impl Unpacked {
             end += (points * record_len) as u64;
             Kept { at, points, lost: OnceLock::new() }
         };
-        Ok(Self { folder: folder.into(), file, record_len, runs: counts.map(run).collect() })
+        Ok(Self {
+            folder: folder.into(),
+            file,
+            record_len,
+            runs: counts.map(run).collect(),
+            is_full: AtomicBool::new(false),
+        })
     }
 
     /// Passes on the records of a run in pieces; `None` if they are not there yet.
@@ -73,19 +84,24 @@ impl Unpacked {
         Ok(Some(lost.clone()))
     }
 
-    /// Keeps the records that `unpack` passes on, and passes them on too.
-    pub(super) fn keep(
-        &self,
-        run: usize,
-        unpack: impl FnOnce(&mut dyn FnMut(&[u8]) -> Result<(), Error>) -> Result<Lost, Error>,
-        take: &mut dyn FnMut(&[u8]) -> Result<(), Error>,
-    ) -> Result<Lost, Error> {
-        let &Kept { mut at, ref lost, .. } = &self.runs[run];
-        let found = unpack(&mut |records| {
-            write_all_at(&self.file, records, at).map_err(|source| temporary_failed(&self.folder, &source))?;
-            at += records.len() as u64;
-            take(records)
-        })?;
-        Ok(lost.get_or_init(|| found).clone())
+    /// Where the records of a run begin in the file.
+    pub(super) fn start(&self, run: usize) -> u64 {
+        self.runs[run].at
+    }
+
+    /// Keeps records at a place in the file, and moves the place behind them. If the disk is full, no more are kept.
+    pub(super) fn keep(&self, at: &mut u64, records: &[u8]) {
+        if !self.is_full.load(Relaxed) && write_all_at(&self.file, records, *at).is_err() {
+            self.is_full.store(true, Relaxed);
+        }
+        *at += records.len() as u64;
+    }
+
+    /// Notes that all records of a run are kept but those that are lost. Unless the disk is full, they are read from
+    /// the file from now on.
+    pub(super) fn finish(&self, run: usize, lost: &Lost) {
+        if !self.is_full.load(Relaxed) {
+            self.runs[run].lost.get_or_init(|| lost.clone());
+        }
     }
 }

@@ -1,5 +1,5 @@
-// Patches of pixels, each drawn by a workgroup. Behind the pixels, `cover` has an element for each, whose `point` is
-// `LEFT_EMPTY` if no splat meets the patch and all its pixels are written as empty.
+// Patches of pixels, each drawn by a workgroup. Behind the pixels, `cover` has an element for each patch. Its `point`
+// is `LEFT_EMPTY` if no splat meets the patch and all its pixels are written as empty.
 
 #import frame
 

@@ -1,7 +1,7 @@
 // The gathering pass [Paper, §4, §5.2]: every point visits the points within its feedback radius. At each one whose
 // delta region holds it, it counts for those of the four radii that reach it, and the furthest distance is kept.
 //
-// Reads: points, pixels, counters. Reads and writes: searches, told.
+// Reads: points, pixels, counters, searches. Reads and writes: told.
 
 #import frame
 #import groups

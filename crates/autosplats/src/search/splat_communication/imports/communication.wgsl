@@ -21,10 +21,10 @@ struct Arguments {
     // The raster form's boxes of one pixel: all screen points, and the queries.
     points: Draw,
     queries: Draw,
-    // Its draws of the iterations; no instances after the last one.
+    // The raster form's draws of the iterations; no instances after the last one.
     clear: Draw,
     boxes: Draw,
-    // Its draws of the passes after the iterations.
+    // The raster form's draws of the passes after the iterations.
     last_clear: Draw,
     last_boxes: Draw,
     // Workgroups that take queries in the iterations; none after the last one.

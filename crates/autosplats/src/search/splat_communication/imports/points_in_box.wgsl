@@ -1,5 +1,5 @@
 // Steps through the pixels of a box that have points, row by row: empty pixels cost next to nothing, as they do where
-// early-Z drops them. The including pass binds `pixels` and `points`.
+// early-Z drops them. The including pass binds `pixels`.
 
 #import frame
 #import depth_mask
