@@ -232,7 +232,7 @@ impl Stream {
             (Some(layout), Some(unpacked)) => {
                 let mut at = unpacked.start(number);
                 let keep = &mut |records: &[u8]| {
-                    unpacked.keep(&mut at, records);
+                    unpacked.keep(&mut at, records)?;
                     take(records)
                 };
                 self.unpack(layout, bytes, run, records, keep)?

@@ -8,10 +8,7 @@
 use std::{
     fs::File,
     path::{Path, PathBuf},
-    sync::{
-        OnceLock,
-        atomic::{AtomicBool, Ordering::Relaxed},
-    },
+    sync::OnceLock,
 };
 
 use autosplats_cloud::{Error, read_exact_at, temporary_failed, temporary_unnamed, write_all_at};
@@ -32,8 +29,6 @@ pub(super) struct Unpacked {
     file: File,
     record_len: usize,
     runs: Vec<Kept>,
-    /// Whether the disk has no room for more.
-    is_full: AtomicBool,
 }
 
 /// Where the records of a run are.
@@ -54,13 +49,7 @@ impl Unpacked {
             end += (points * record_len) as u64;
             Kept { at, points, lost: OnceLock::new() }
         };
-        Ok(Self {
-            folder: folder.into(),
-            file,
-            record_len,
-            runs: counts.map(run).collect(),
-            is_full: AtomicBool::new(false),
-        })
+        Ok(Self { folder: folder.into(), file, record_len, runs: counts.map(run).collect() })
     }
 
     /// Passes on the records of a run in pieces; `None` if they are not there yet.
@@ -89,19 +78,15 @@ impl Unpacked {
         self.runs[run].at
     }
 
-    /// Keeps records at a place in the file, and moves the place behind them. If the disk is full, no more are kept.
-    pub(super) fn keep(&self, at: &mut u64, records: &[u8]) {
-        if !self.is_full.load(Relaxed) && write_all_at(&self.file, records, *at).is_err() {
-            self.is_full.store(true, Relaxed);
-        }
+    /// Keeps records at a place in the file, and moves the place behind them.
+    pub(super) fn keep(&self, at: &mut u64, records: &[u8]) -> Result<(), Error> {
+        write_all_at(&self.file, records, *at).map_err(|source| temporary_failed(&self.folder, &source))?;
         *at += records.len() as u64;
+        Ok(())
     }
 
-    /// Notes that all records of a run are kept but those that are lost. Unless the disk is full, they are read from
-    /// the file from now on.
+    /// Notes that all records of a run are kept but those that are lost. They are read from the file from now on.
     pub(super) fn finish(&self, run: usize, lost: &Lost) {
-        if !self.is_full.load(Relaxed) {
-            self.runs[run].lost.get_or_init(|| lost.clone());
-        }
+        self.runs[run].lost.get_or_init(|| lost.clone());
     }
 }
