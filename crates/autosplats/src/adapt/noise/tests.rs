@@ -22,7 +22,7 @@ fn the_order_of_points_does_not_matter() {
     }
 }
 
-/// Places in view space, seen by an eye that moves by `step`, keep their hashes; places beside them have others.
+/// Places keep their hashes when the eye moves; places beside them have others.
 #[test]
 fn hashes_stay_when_the_eye_moves() {
     let looks = |eye: DVec3| {
