@@ -29,11 +29,12 @@ mod view;
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
+use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use autosplats::Backend;
 use autosplats::cloud::ErrorKind;
-use eframe::egui;
+use eframe::{egui, egui_wgpu, wgpu};
 
 pub use autosplats_sources::Input;
 
@@ -96,8 +97,13 @@ pub fn run(mut options: Options) -> Result<(), Error> {
         .with_inner_size(session::START_SIZE.map(|side| side as f32))
         .with_min_inner_size([640.0, 400.0])
         .with_drag_and_drop(true);
-    let native =
-        eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, dithering: false, ..Default::default() };
+    let native = eframe::NativeOptions {
+        viewport,
+        renderer: eframe::Renderer::Wgpu,
+        wgpu_options: device_options(),
+        dithering: false,
+        ..Default::default()
+    };
     let close = options.close.take();
     let unsaved = Rc::<RefCell<Option<String>>>::default();
     let told = Rc::clone(&unsaved);
@@ -106,8 +112,10 @@ pub fn run(mut options: Options) -> Result<(), Error> {
         close.into_iter().for_each(|close| close_on(close, &creation.egui_ctx));
         let (look, recent) = view::storage::load(creation.storage);
         let mut app = app::App::new(options, look, recent, &creation.egui_ctx);
-        app.view.format = creation.wgpu_render_state.as_ref().map(|state| state.target_format);
-        app.view.turns = view::turns::are_taken(creation).then(Default::default);
+        if let Some(state) = &creation.wgpu_render_state {
+            let (device, queue) = (state.device.clone(), state.queue.clone());
+            app.view.share(view::WindowDevice { device, queue, format: state.target_format });
+        }
         app.unsaved = told;
         if let Some(state) = state {
             let folder = app.session.file.as_deref().map(view::state::folder).unwrap_or_default();
@@ -121,6 +129,15 @@ pub fn run(mut options: Options) -> Result<(), Error> {
     }
     eframe::run_native("autosplats", native, create).map_err(|error| Error::Window(error.to_string()))?;
     unsaved.take().map_or(Ok(()), |why| Err(Error::Unsaved(why)))
+}
+
+/// A device that draws the window and can render pictures too. Without the checks that `wgpu` adds by default: that of
+/// indirect dispatches would put one more dispatch and barriers before most steps of a picture.
+fn device_options() -> egui_wgpu::WgpuConfiguration {
+    let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
+    setup.instance_descriptor.flags = wgpu::InstanceFlags::empty().with_env();
+    setup.device_descriptor = Arc::new(autosplats::device_descriptor);
+    egui_wgpu::WgpuConfiguration { wgpu_setup: setup.into(), ..Default::default() }
 }
 
 /// Closes the window once a message comes.

@@ -5,6 +5,7 @@ mod dialogs;
 mod edits;
 mod mouse;
 mod moving;
+mod on_device;
 mod opening;
 mod rest;
 mod shortcuts;
@@ -23,7 +24,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use crate::app::App;
-use crate::view::Look;
+use crate::view::{Look, WindowDevice};
 use crate::{Input, Options};
 
 /// The smallest window in which everything has to work.
@@ -42,6 +43,8 @@ struct Window {
     harness: Harness<'static, App>,
     commands: Vec<ViewportCommand>,
     outputs: Vec<OutputCommand>,
+    /// The device that the window shares with its pictures.
+    device: Option<WindowDevice>,
 }
 
 impl Window {
@@ -55,15 +58,28 @@ impl Window {
         Self::of(Options { backend: Some(backend), ..Options::default() }, names)
     }
 
+    /// A window on a device that renders its pictures too.
+    fn sharing(device: WindowDevice, names: &[&str]) -> Self {
+        Self::with(Options { backend: Some(Backend::Gpu), ..Options::default() }, names, Some(device))
+    }
+
     /// A window with options.
     fn of(options: Options, names: &[&str]) -> Self {
+        Self::with(options, names, None)
+    }
+
+    fn with(options: Options, names: &[&str], device: Option<WindowDevice>) -> Self {
         let parse = |name: &&str| Input::parse(name).unwrap_or_else(|error| panic!("{name}: {error}"));
         let options = Options { inputs: names.iter().map(parse).collect(), ..options };
         let builder = Harness::builder().with_size(SMALL).with_step_dt(1.0 / 60.0).with_max_steps(2);
         let builder = builder.with_accessibility_check(false).with_os(egui::os::OperatingSystem::Nix);
-        let harness =
-            builder.build_eframe(move |creation| App::new(options, Look::default(), Vec::new(), &creation.egui_ctx));
-        Self { harness, commands: Vec::new(), outputs: Vec::new() }
+        let shared = device.clone();
+        let harness = builder.build_eframe(move |creation| {
+            let mut app = App::new(options, Look::default(), Vec::new(), &creation.egui_ctx);
+            shared.into_iter().for_each(|device| app.view.share(device));
+            app
+        });
+        Self { harness, commands: Vec::new(), outputs: Vec::new(), device }
     }
 
     /// A window that shows the statue.

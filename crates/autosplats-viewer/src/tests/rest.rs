@@ -2,14 +2,21 @@
 
 use autosplats::{Image, Renderer, usual_exposure};
 
+use super::on_device::read;
 use super::*;
+use crate::view::Pixels;
 
 /// The picture in the window once no work is left.
-fn at_rest(window: &mut Window) -> Image {
+pub(super) fn at_rest(window: &mut Window) -> Image {
     window.settle();
     window.until("all is done", |window| window.app().view.render.is_idle());
     window.steps(2);
-    Image::clone(&window.app().view.shot.as_ref().expect("there is a picture").image)
+    let pixels = window.app().view.shot.as_ref().expect("there is a picture").pixels.clone();
+    match (pixels, &window.device) {
+        (Pixels::Image(image), _) => Image::clone(&image),
+        (Pixels::Texture { texture, supersample }, Some(device)) => read(device, &texture).averaged(supersample),
+        (Pixels::Texture { .. }, None) => panic!("the window has no device"),
+    }
 }
 
 /// The same picture rendered by the library, supersampled and averaged.

@@ -16,8 +16,6 @@ pub(crate) mod state;
 pub(crate) mod storage;
 pub(crate) mod turns;
 
-use std::sync::Arc;
-
 use autosplats::{AdapterSummary, Camera};
 use eframe::egui::{self, Color32, Sense};
 
@@ -26,7 +24,9 @@ pub(crate) use self::navigation::{Flight, Navigation};
 use self::pictures::RequestKey;
 pub(crate) use self::rate::Rate;
 pub(crate) use self::recording::Recording;
-pub(crate) use self::render::{Answer, Goal, Outcome, PickHit, Picture, Purpose, RenderRequest, RenderThread, Task};
+pub(crate) use self::render::{
+    Answer, Goal, Outcome, PickHit, Picture, Pixels, Purpose, RenderRequest, RenderThread, Task, WindowDevice,
+};
 pub(crate) use self::screen::OnScreen;
 pub(crate) use self::state::State;
 pub(crate) use self::turns::Turns;
@@ -101,6 +101,13 @@ impl View {
         }
     }
 
+    /// Tells how the window is drawn, before its first frame. Pictures then stay on its device where they can.
+    pub(crate) fn share(&mut self, window: WindowDevice) {
+        self.format = Some(window.format);
+        self.turns = turns::are_taken(&window.device).then(Turns::default);
+        self.render.share(window);
+    }
+
     /// Takes all free room of the window for the picture. Returns the mouse's response and the size in pixels.
     pub(crate) fn place(&mut self, ui: &mut egui::Ui) -> (egui::Response, [u32; 2]) {
         let rect = ui.available_rect_before_wrap();
@@ -119,7 +126,7 @@ impl View {
         let painter = ui.painter_at(self.rect);
         match (&self.shot, self.format) {
             (Some(picture), Some(format)) => {
-                let on_screen = OnScreen { image: Arc::clone(&picture.image), sharp: picture.dots, format };
+                let on_screen = OnScreen { pixels: picture.pixels.clone(), sharp: picture.dots, format };
                 painter.add(eframe::egui_wgpu::Callback::new_paint_callback(self.rect, on_screen));
             }
             (Some(_), None) => {}

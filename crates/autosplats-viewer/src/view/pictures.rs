@@ -58,9 +58,9 @@ impl View {
                     crate::threads::spawn("free", move || drop(before));
                 }
             }
-            Answer::Finer(image) => {
+            Answer::Finer(pixels) => {
                 if let Some(shot) = &mut self.shot {
-                    shot.image = image;
+                    shot.pixels = pixels;
                 }
             }
             Answer::Empty => self.shot = None,

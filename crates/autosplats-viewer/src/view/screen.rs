@@ -1,15 +1,16 @@
 //! Draws the picture into the window by a pass of its own, which reads one texture once per pixel. egui's own image
 //! drawing takes several times as long, which counts where the CPU draws the window.
 
-use std::sync::Arc;
-
 use autosplats::Image;
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
+use eframe::wgpu::util::DeviceExt as _;
 use eframe::{egui, wgpu};
+
+use super::{Pixels, WindowDevice};
 
 /// A picture to draw.
 pub(crate) struct OnScreen {
-    pub(crate) image: Arc<Image>,
+    pub(crate) pixels: Pixels,
     /// Whether to enlarge without blending.
     pub(crate) sharp: bool,
     /// Pixel format of the window.
@@ -21,7 +22,7 @@ struct Screen {
     pipeline: wgpu::RenderPipeline,
     texture: wgpu::Texture,
     bindings: wgpu::BindGroup,
-    image: Arc<Image>,
+    pixels: Pixels,
     sharp: bool,
 }
 
@@ -34,17 +35,14 @@ impl CallbackTrait for OnScreen {
         _encoder: &mut wgpu::CommandEncoder,
         resources: &mut CallbackResources,
     ) -> Vec<wgpu::CommandBuffer> {
-        let size = |image: &Image| [image.width, image.height];
         let screen = match resources.remove::<Screen>() {
-            Some(screen) if Arc::ptr_eq(&screen.image, &self.image) => screen,
-            Some(mut screen) if size(&screen.image) == size(&self.image) && screen.sharp == self.sharp => {
-                screen.image = Arc::clone(&self.image);
-                screen.upload(queue);
-                screen
-            }
+            Some(screen) if screen.pixels.are(&self.pixels) && screen.sharp == self.sharp => screen,
             screen => {
-                let pipeline = screen.map_or_else(|| pipeline(device, self.format), |screen| screen.pipeline);
-                let screen = self.new_screen(device, pipeline);
+                let screen = match screen {
+                    Some(screen) if screen.has_room_for(self) => Screen { pixels: self.pixels.clone(), ..screen },
+                    Some(screen) => self.new_screen(device, screen.pipeline),
+                    None => self.new_screen(device, pipeline(device, self.format)),
+                };
                 screen.upload(queue);
                 screen
             }
@@ -67,29 +65,37 @@ impl CallbackTrait for OnScreen {
 }
 
 impl OnScreen {
-    fn new_screen(&self, device: &wgpu::Device, pipeline: wgpu::RenderPipeline) -> Screen {
-        let Image { width, height, .. } = *self.image;
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
+    fn new_texture(&self, device: &wgpu::Device, image: &Image) -> wgpu::Texture {
+        device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            size: wgpu::Extent3d { width: image.width, height: image.height, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            // An sRGB window converts linear values on output, so the texture converts on input.
-            format: if self.format.is_srgb() {
-                wgpu::TextureFormat::Rgba8UnormSrgb
-            } else {
-                wgpu::TextureFormat::Rgba8Unorm
-            },
+            format: WindowDevice::texture_format(self.format),
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
-        });
+        })
+    }
+
+    fn new_screen(&self, device: &wgpu::Device, pipeline: wgpu::RenderPipeline) -> Screen {
+        let (texture, supersample) = match &self.pixels {
+            Pixels::Texture { texture, supersample } => (wgpu::Texture::clone(texture), *supersample),
+            Pixels::Image(image) => (self.new_texture(device, image), 1),
+        };
         let filter = if self.sharp { wgpu::FilterMode::Nearest } else { wgpu::FilterMode::Linear };
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("picture"),
             mag_filter: filter,
             min_filter: filter,
             ..Default::default()
+        });
+        // `Reading` of `screen.wgsl`.
+        let reading = [supersample, u32::from(!texture.format().is_srgb())].map(u32::to_ne_bytes);
+        let reading = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("picture"),
+            contents: reading.as_flattened(),
+            usage: wgpu::BufferUsages::UNIFORM,
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -98,22 +104,25 @@ impl OnScreen {
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&view) },
                 wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(&sampler) },
+                wgpu::BindGroupEntry { binding: 2, resource: reading.as_entire_binding() },
             ],
         });
-        Screen { pipeline, texture, bindings, image: Arc::clone(&self.image), sharp: self.sharp }
+        Screen { pipeline, texture, bindings, pixels: self.pixels.clone(), sharp: self.sharp }
     }
 }
-
 impl Screen {
+    /// Whether the texture is this object's own and takes the picture.
+    fn has_room_for(&self, next: &OnScreen) -> bool {
+        let (Pixels::Image(old), Pixels::Image(new)) = (&self.pixels, &next.pixels) else { return false };
+        [old.width, old.height] == [new.width, new.height] && self.sharp == next.sharp
+    }
+
+    /// Writes a picture in memory into the texture.
     fn upload(&self, queue: &wgpu::Queue) {
+        let Pixels::Image(image) = &self.pixels else { return };
         let layout =
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * self.image.width), rows_per_image: None };
-        queue.write_texture(
-            self.texture.as_image_copy(),
-            self.image.pixels.as_flattened(),
-            layout,
-            self.texture.size(),
-        );
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * image.width), rows_per_image: None };
+        queue.write_texture(self.texture.as_image_copy(), image.pixels.as_flattened(), layout, self.texture.size());
     }
 }
 

@@ -46,9 +46,8 @@ impl Turns {
 }
 
 /// Whether the device that draws the window is a software device on the CPU.
-pub(crate) fn are_taken(creation: &eframe::CreationContext<'_>) -> bool {
-    let device = creation.wgpu_render_state.as_ref();
-    device.is_some_and(|state| state.adapter.get_info().device_type == eframe::wgpu::DeviceType::Cpu)
+pub(crate) fn are_taken(device: &eframe::wgpu::Device) -> bool {
+    device.adapter_info().device_type == eframe::wgpu::DeviceType::Cpu
 }
 
 #[cfg(test)]

@@ -53,10 +53,34 @@ impl Gpu {
     pub(crate) fn target(
         &self,
         label: &'static str,
-        [width, height]: [u32; 2],
+        size: [u32; 2],
         format: wgpu::TextureFormat,
     ) -> Result<wgpu::TextureView, Error> {
-        let texture = self.checked(|| {
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+        let texture = self.texture(label, size, format, usage)?;
+        Ok(texture.create_view(&wgpu::TextureViewDescriptor { label: Some(label), ..Default::default() }))
+    }
+
+    /// A flat texture with any usage.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLimit`] if the device has none so large, [`Error::DeviceMemory`] if it has no room.
+    pub(crate) fn texture(
+        &self,
+        label: &'static str,
+        [width, height]: [u32; 2],
+        format: wgpu::TextureFormat,
+        usage: wgpu::TextureUsages,
+    ) -> Result<wgpu::Texture, Error> {
+        let (needed, allowed) = (width.max(height), self.device.limits().max_texture_dimension_2d);
+        if needed > allowed {
+            return Err(Error::DeviceLimit {
+                what: "a side of a texture",
+                needed: needed.into(),
+                allowed: allowed.into(),
+            });
+        }
+        self.checked(|| {
             self.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
                 size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
@@ -64,11 +88,10 @@ impl Gpu {
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
                 format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+                usage,
                 view_formats: &[],
             })
-        })?;
-        Ok(texture.create_view(&wgpu::TextureViewDescriptor { label: Some(label), ..Default::default() }))
+        })
     }
 
     /// A buffer with any usage.

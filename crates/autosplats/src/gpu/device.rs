@@ -82,6 +82,19 @@ pub(crate) const INT64_ATOMICS: wgpu::Features =
 pub(crate) const INT64_IN_LANES: wgpu::Features =
     INT64_ATOMICS.union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS).union(wgpu::Features::SUBGROUP);
 
+/// The device that suits a renderer best: all limits of the adapter, and those of its features that renderers use. For
+/// [`Renderer::with_device`](crate::Renderer::with_device).
+pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
+    let timing = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
+    let optional = INT64_IN_LANES | timing | wgpu::Features::FLOAT32_BLENDABLE | wgpu::Features::PIPELINE_CACHE;
+    wgpu::DeviceDescriptor {
+        label: Some("autosplats"),
+        required_features: adapter.features() & optional,
+        required_limits: adapter.limits(),
+        ..Default::default()
+    }
+}
+
 fn usable_adapters() -> Vec<wgpu::Adapter> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::PRIMARY;
@@ -161,21 +174,9 @@ impl Gpu {
     }
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self, Error> {
-        let timing = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
-        let optional = INT64_IN_LANES | timing | wgpu::Features::FLOAT32_BLENDABLE | wgpu::Features::PIPELINE_CACHE;
-        let descriptor = wgpu::DeviceDescriptor {
-            label: Some("autosplats"),
-            required_features: adapter.features() & optional,
-            required_limits: adapter.limits(),
-            ..Default::default()
-        };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+        let (device, queue) = pollster::block_on(adapter.request_device(&device_descriptor(adapter)))
             .map_err(|error| Error::Device(format!("{} does not start: {error}", adapter.get_info().name)))?;
-        let mut gpu = Self::from_parts(device, queue);
-        // Software compiles anew in any case.
-        if let (false, Some(folder)) = (gpu.is_software(), cache_folder()) {
-            gpu.pipelines = PipelineFile::open(&gpu.device, &folder).map(Arc::new);
-        }
+        let gpu = Self::from_parts(device, queue);
         let reason = Arc::clone(&gpu.lost);
         gpu.device.set_device_lost_callback(move |_, message| {
             *reason.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
@@ -186,7 +187,10 @@ impl Gpu {
     /// Takes the caller's device and leaves its callback for loss alone; a loss is noticed when the device does not
     /// answer.
     pub(crate) fn from_parts(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        Self { device, queue, lost: Arc::default(), compiled: Arc::default(), pipelines: None }
+        // Software compiles anew in any case.
+        let folder = cache_folder().filter(|_| !is_software(&device.adapter_info()));
+        let pipelines = folder.and_then(|folder| PipelineFile::open(&device, &folder)).map(Arc::new);
+        Self { device, queue, lost: Arc::default(), compiled: Arc::default(), pipelines }
     }
 
     /// Keeps the pipelines compiled so far for the next start. Without a file, that only starts more slowly.

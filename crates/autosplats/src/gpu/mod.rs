@@ -22,7 +22,7 @@ pub(crate) use buffers::read_back;
 pub(crate) use compiled::Pass;
 #[cfg(test)]
 pub(crate) use device::test_gpu;
-pub use device::{AdapterSummary, adapters};
+pub use device::{AdapterSummary, adapters, device_descriptor};
 pub(crate) use device::{Gpu, INT64_ATOMICS, INT64_IN_LANES};
 pub(crate) use frame::FrameUniform;
 pub(crate) use link::{Constant, File, InWgsl, LARGE_GROUP, Library, SMALL_GROUP, constants, files, indices, link};

@@ -55,12 +55,17 @@ pub(crate) struct Recorder<'a> {
     clock: &'a Clock,
     /// Whether each step is timed by itself.
     each_step: bool,
+    /// Whether others have turns on the device after each stage.
+    takes_turns: bool,
     /// What is being timed.
     timed: Option<&'static str>,
     times: Vec<PassTime>,
     /// Number of compute passes begun.
     #[cfg(test)]
     pub(crate) begun: usize,
+    /// Number of submissions before the last.
+    #[cfg(test)]
+    submitted: usize,
 }
 
 impl Clock {
@@ -147,16 +152,24 @@ impl<'a> Recorder<'a> {
             pass: None,
             clock,
             each_step: false,
+            takes_turns: false,
             timed: None,
             times: Vec::new(),
             #[cfg(test)]
             begun: 0,
+            #[cfg(test)]
+            submitted: 0,
         }
     }
 
     /// Times each step by itself if `each`, in a compute pass of its own.
     pub(crate) fn timing_each(self, each: bool) -> Self {
         Self { each_step: each, ..self }
+    }
+
+    /// Submits each stage by itself and waits for it, if `takes_turns`. What others submit runs between the stages.
+    pub(crate) fn taking_turns(self, takes_turns: bool) -> Self {
+        Self { takes_turns, ..self }
     }
 
     /// The encoder, for commands other than steps.
@@ -227,8 +240,9 @@ impl<'a> Recorder<'a> {
                     self.pass = None;
                 }
             }
-            Clock::Wall => self.submit_if_waiting(),
+            Clock::Wall => {}
         }
+        self.submit_if_waiting();
     }
 
     fn add_time(&mut self, name: &'static str) {
@@ -265,19 +279,25 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// If times are those of waiting, submits the recorded commands, waits, and stores the last time.
+    /// If times are those of waiting, or others have turns, submits the recorded commands and waits for them.
     fn submit_if_waiting(&mut self) {
-        if !matches!(self.clock, Clock::Wall) {
+        let is_timed = matches!(self.clock, Clock::Wall);
+        if !(is_timed || self.takes_turns) {
             return;
         }
         self.pass = None;
         let commands = std::mem::replace(&mut self.encoder, encoder(self.gpu)).finish();
         let start = Instant::now();
-        self.gpu.queue.submit([commands]);
+        // Not for what others submit.
+        let submission_index = Some(self.gpu.queue.submit([commands]));
         // A lost device is noticed at the end of the frame.
-        let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
-        if let Some(time) = self.times.last_mut() {
+        let _ = self.gpu.device.poll(wgpu::PollType::Wait { submission_index, timeout: None });
+        if let Some(time) = self.times.last_mut().filter(|_| is_timed) {
             time.ms = start.elapsed().as_secs_f64() * 1e3;
+        }
+        #[cfg(test)]
+        {
+            self.submitted += 1;
         }
     }
 
@@ -335,18 +355,28 @@ mod tests {
         }
         let mut runs = 0;
         for (clock, passes) in &clocks {
-            for each in [false, true] {
+            for (each, turns) in [(false, false), (true, false), (false, true), (true, true)] {
                 let record = || {
-                    let mut recorder = Recorder::new(&gpu, clock).timing_each(each);
+                    let mut recorder = Recorder::new(&gpu, clock).timing_each(each).taking_turns(turns);
                     steps.iter().for_each(|step| recorder.run(step));
                     let begun = recorder.begun;
+                    recorder.encoder();
+                    let runs = if each { 4 } else { 3 };
+                    let waits = turns || matches!(clock, Clock::Wall);
+                    assert_eq!(recorder.submitted, if waits { runs } else { 0 }, "submissions with {clock:?}");
                     let mut times = recorder.finish();
                     let spans = clock.read(&gpu, &mut times);
                     (begun, times, spans)
                 };
                 let (begun, times, spans) = gpu.checked(record).expect("valid commands");
                 let is_off = matches!(clock, Clock::Off);
-                assert_eq!(begun, if each && !is_off { 4 } else { *passes }, "passes with {clock:?}");
+                let passes = match (each, turns, is_off) {
+                    (true, false, true) => 1,
+                    (true, ..) => 4,
+                    (false, true, _) => 3,
+                    (false, false, _) => *passes,
+                };
+                assert_eq!(begun, passes, "passes with {clock:?}");
                 let names: Vec<_> = times.iter().map(|time| time.pass).collect();
                 let runs_of_stages = ["search", "fit", "search"];
                 let expected = if each { &paths[..] } else { &runs_of_stages };

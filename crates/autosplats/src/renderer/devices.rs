@@ -64,6 +64,22 @@ impl Renderer {
         }
     }
 
+    /// Says whether others have turns on the device while a frame is in work, such as a window that shares it. Each
+    /// stage is then submitted by itself and waited for, so that none of their work waits for a whole frame. Frames
+    /// that return before they are done take no turns. Default: no.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// let mut renderer = autosplats::Renderer::new();
+    /// renderer.take_turns(true);
+    /// ```
+    pub fn take_turns(&mut self, take: bool) {
+        if let BackendRenderer::Gpu(renderer) = &mut self.form {
+            renderer.take_turns(take);
+        }
+    }
+
     /// The device that renders; `None` on the CPU.
     pub fn adapter(&self) -> Option<AdapterSummary> {
         match &self.form {

@@ -12,6 +12,7 @@ use super::checks::{check, check_count};
 use super::exposure::Exposure;
 use super::rules::{Mode, Rules};
 use super::surfels::point_surfels;
+use super::texture::Destination;
 use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Settings, Timings};
 use crate::Error;
@@ -28,7 +29,7 @@ use crate::project::gpu::{Counter, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, SlotTable, Uploader};
 use crate::search::SearchEngine;
 use crate::search::gpu::{check_engine, convergence};
-use crate::shade::gpu::{ReadPicture, check_texture, finish};
+use crate::shade::gpu::{ReadPicture, finish};
 use crate::shade::{Image, Scene};
 use crate::splat::{GBuffer, LayerBuffers};
 
@@ -40,6 +41,8 @@ pub(super) struct GpuRenderer {
     clock: Clock,
     /// Whether each pass of a frame in memory is timed by itself.
     times_passes: bool,
+    /// Whether others have turns on the device between the stages of a frame.
+    takes_turns: bool,
     uploader: Uploader,
     cloud: DeviceCloud,
     /// Buffer of the sensor positions of the points, and its number of runs of points.
@@ -85,6 +88,7 @@ impl GpuRenderer {
         Ok(Self {
             clock: Clock::new(&gpu),
             times_passes: false,
+            takes_turns: false,
             uploader: Uploader::default(),
             cloud: DeviceCloud::default(),
             sensors: None,
@@ -111,6 +115,11 @@ impl GpuRenderer {
     /// See [`Renderer::time_passes`](super::Renderer::time_passes).
     pub(super) fn time_passes(&mut self, each: bool) {
         self.times_passes = each;
+    }
+
+    /// See [`Renderer::take_turns`](super::Renderer::take_turns).
+    pub(super) fn take_turns(&mut self, take: bool) {
+        self.takes_turns = take;
     }
 
     /// Checks that the device can run the engine.
@@ -231,14 +240,14 @@ impl GpuRenderer {
         &mut self,
         points: Points<'_>,
         camera: &Camera,
-        size: [u32; 2],
+        destination: Destination<'_>,
         settings: &Settings,
         unit: f64,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Frame<'_>, Error> {
-        let view = check(points, camera, size, settings)?;
+        let view = check(points, camera, destination.checked_size()?, settings)?;
         // `checked` turns every failure of the device into an error.
-        self.gpu.clone().checked(move || self.frame(points, &view, size, settings, unit, go_on))?
+        self.gpu.clone().checked(move || self.frame(points, &view, destination, settings, unit, go_on))?
     }
 
     /// Renders after the checks.
@@ -246,7 +255,7 @@ impl GpuRenderer {
         &mut self,
         points: Points<'_>,
         view: &View,
-        size: [u32; 2],
+        destination: Destination<'_>,
         settings: &Settings,
         unit: f64,
         go_on: &(dyn Fn() -> bool + Sync),
@@ -261,6 +270,7 @@ impl GpuRenderer {
             gpu,
             clock,
             times_passes,
+            takes_turns,
             prepared,
             upward,
             exposure,
@@ -274,29 +284,39 @@ impl GpuRenderer {
         } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = scene(points, view, &wanted, unit, settings, (upward, exposure));
-        prepared.write_uniforms(gpu, frame, (screen, points, None), &rules, settings, &scene);
+        prepared.write_uniforms(gpu, frame, (screen, points, destination.format()), &rules, settings, &scene);
 
         let waited = Instant::now();
-        let mut recorder = Recorder::new(gpu, clock).timing_each(*times_passes);
+        let mut recorder = Recorder::new(gpu, clock).timing_each(*times_passes).taking_turns(*takes_turns);
         prepared.steps.iter().for_each(|step| recorder.run(step));
-        let mut wants = vec![&prepared.screen.counters, &prepared.picture.image];
+        let mut wants = vec![&prepared.screen.counters];
+        match destination {
+            Destination::Memory(_) => wants.push(&prepared.picture.image),
+            Destination::Texture(texture) => prepared.picture.copy_to_texture(recorder.encoder(), texture)?,
+        }
         if settings.all_layers {
             let LayerBuffers { surface, cover, extras, .. } = &prepared.layers;
-            wants.extend([&prepared.picture.linear, surface, cover, extras]);
+            let linear = matches!(destination, Destination::Memory(_)).then_some(&prepared.picture.linear);
+            wants.extend(linear.into_iter().chain([surface, cover, extras]));
         }
         readback.copy(gpu, recorder.encoder(), &wants)?;
         *times = recorder.finish();
         // The submitted frame replaces the surfels of the last one.
         *last_view = Some(*screen);
-        prepared.seen = Some((points.placed(*screen), points.identity(), (settings.clone(), None)));
+        prepared.seen = Some((points.placed(*screen), points.identity(), (settings.clone(), destination.format())));
         let (counters, value_range) = readback.read(gpu, |parts| {
             let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
             let range = [Counter::RangeLow, Counter::RangeHigh].map(|end| counters[end as usize]);
-            let linear = if settings.all_layers { parts[2] } else { &[] };
-            let read = ReadPicture { size, image: parts[1], linear, range };
+            let (picture, read_layers) = parts[1..].split_at(parts.len() - 1 - if settings.all_layers { 3 } else { 0 });
+            let read = ReadPicture {
+                size: view.picture_size(),
+                image: picture.first().copied().unwrap_or_default(),
+                linear: picture.get(1).copied().unwrap_or_default(),
+                range,
+            };
             let value_range = finish(&read, &scene, &settings.shading, image);
-            *layers = match parts {
-                [_, _, _, surface, cover, extras] => prepared.layers.to_host(screen.margin, surface, cover, extras),
+            *layers = match read_layers {
+                [surface, cover, extras] => prepared.layers.to_host(screen.margin, surface, cover, extras),
                 _ => GBuffer::default(),
             };
             layers.scalar_about = scene.values;
@@ -331,9 +351,7 @@ impl GpuRenderer {
         settings: &Settings,
         unit: f64,
     ) -> Result<(), Error> {
-        let size = [texture.width(), texture.height()];
-        check_texture(texture, size)?;
-        let view = check(points, camera, size, settings)?;
+        let view = check(points, camera, Destination::Texture(texture).checked_size()?, settings)?;
         self.gpu.clone().checked(|| self.frame_in_texture(points, &view, texture, settings, unit))?
     }
 

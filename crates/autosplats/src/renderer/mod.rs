@@ -15,6 +15,7 @@ mod settings;
 mod settle;
 mod still;
 mod surfels;
+mod texture;
 mod upward;
 
 use autosplats_cloud::PointCloud;
@@ -193,10 +194,10 @@ impl Renderer {
         }
     }
 
-    /// Creates a renderer on the caller's device. No feature is required, except that
-    /// [`SplatCommunicationRaster`](crate::SearchEngine::SplatCommunicationRaster) needs `FLOAT32_BLENDABLE`. The
-    /// renderer uses `SHADER_INT64`, `SHADER_INT64_ATOMIC_MIN_MAX` and `TIMESTAMP_QUERY` if the device has them.
-    /// Without timestamps, passes are not timed, and the time of a frame includes reading it back.
+    /// Creates a renderer on the caller's device, best made by [`device_descriptor`](crate::device_descriptor). No
+    /// feature is required, except that [`SplatCommunicationRaster`](crate::SearchEngine::SplatCommunicationRaster)
+    /// needs `FLOAT32_BLENDABLE`. Without timestamps, passes are not timed, and the time of a frame includes reading it
+    /// back.
     ///
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has; [`Error::DeviceMemory`].
@@ -204,14 +205,12 @@ impl Renderer {
     /// # Examples
     ///
     /// ```no_run
-    /// use autosplats::{Renderer, wgpu};
+    /// use autosplats::{Renderer, device_descriptor, wgpu};
     ///
     /// # async fn renderer() -> Result<Renderer, Box<dyn std::error::Error>> {
     /// let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     /// let adapter = instance.request_adapter(&wgpu::RequestAdapterOptions::default()).await?;
-    /// let required_limits = adapter.limits();
-    /// let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
-    /// let (device, queue) = adapter.request_device(&descriptor).await?;
+    /// let (device, queue) = adapter.request_device(&device_descriptor(&adapter)).await?;
     /// let renderer = Renderer::with_device(device, queue)?;
     /// # Ok(renderer)
     /// # }
@@ -413,47 +412,6 @@ impl Renderer {
                 let points = points.into();
                 self.scaling.choose(points, None);
                 renderer.upload(self.scaling.points(points), settings, report)
-            }
-        }
-    }
-
-    /// Renders into a whole texture without waiting for the device. The texture must be made by this renderer's device,
-    /// in format `Rgba8Unorm`, `Bgra8Unorm` or one of their `Srgb` forms, with usage `COPY_DST`. No legend is drawn.
-    ///
-    /// # Errors
-    /// Those of [`render`](Self::render); [`Error::Texture`] if the texture is unsuitable; [`Error::Device`] if this
-    /// renderer runs on the CPU.
-    ///
-    /// # Examples
-    ///
-    /// ```no_run
-    /// use autosplats::{Error, Renderer, Settings, wgpu};
-    /// # use autosplats::{Camera, cloud::PointCloud};
-    ///
-    /// /// The texture has format `Rgba8Unorm` and usages `COPY_DST` and `TEXTURE_BINDING`.
-    /// fn draw(
-    ///     renderer: &mut Renderer,
-    ///     cloud: &PointCloud,
-    ///     camera: &Camera,
-    ///     texture: &wgpu::Texture,
-    /// ) -> Result<(), Error> {
-    ///     renderer.render_to_texture(cloud, camera, texture, &Settings::default())
-    /// }
-    /// ```
-    pub fn render_to_texture<'a>(
-        &mut self,
-        points: impl Into<Points<'a>>,
-        camera: &Camera,
-        texture: &wgpu::Texture,
-        settings: &Settings,
-    ) -> Result<(), Error> {
-        match &mut self.form {
-            BackendRenderer::Cpu(_) => Err(Error::Device("a texture can only be rendered into on a GPU".into())),
-            BackendRenderer::Gpu(renderer) => {
-                let (points, scaling) = (points.into(), &mut self.scaling);
-                scaling.choose(points, Some(camera));
-                let (camera, settings) = (scaling.camera(camera), scaling.settings(settings));
-                renderer.render_to_texture(scaling.points(points), &camera, texture, &settings, scaling.unit())
             }
         }
     }

@@ -8,6 +8,7 @@ use std::borrow::Cow;
 
 use autosplats_cloud::{PointCloud, computing_scale_of};
 
+use super::texture::Destination;
 use super::{BackendRenderer, Frame, PointSurfel, Renderer, Settings};
 use crate::Error;
 use crate::camera::{Camera, Projection};
@@ -150,7 +151,9 @@ impl Renderer {
             (BackendRenderer::Cpu(renderer), None) => {
                 renderer.render((shown, unit), &camera, size, &settings, None, go_on)
             }
-            (BackendRenderer::Gpu(renderer), None) => renderer.render(shown, &camera, size, &settings, unit, go_on),
+            (BackendRenderer::Gpu(renderer), None) => {
+                renderer.render(shown, &camera, Destination::Memory(size), &settings, unit, go_on)
+            }
             (BackendRenderer::Gpu(_), Some(_)) => {
                 Err(Error::Device("precomputed normals are rendered on the CPU only".into()))
             }

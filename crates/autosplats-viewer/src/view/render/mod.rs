@@ -5,26 +5,32 @@
 //! never by a queue. [Tasks](Task) that must be done, such as finding the point under the cursor, run in order before
 //! the next picture. Results arrive as [`Answer`]s, each with a request to repaint the window.
 //!
+//! Where the device of the window renders the pictures too, they stay on it (`window_device`).
+//!
 //! While the view moves, pictures are rendered smaller, and of fewer points if need be, to meet their time limit
 //! (`pace`). A whole picture in work is given up when the view moves. Once nothing more is requested, the picture at
 //! rest is rendered again, supersampled.
 
+mod chosen;
 mod depths;
+mod exposure;
 mod pace;
 mod task;
 mod thread;
+mod window_device;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use autosplats::cloud::Axes;
-use autosplats::{AdapterSummary, Backend, Camera, Counts, Image, Settings, Timings};
+use autosplats::{AdapterSummary, Backend, Camera, Counts, Settings, Timings};
 use eframe::egui;
 
 pub(crate) use self::depths::Depths;
 pub(crate) use self::task::{Goal, Outcome, PickHit, Purpose, Task};
+pub(crate) use self::window_device::{Pixels, WindowDevice};
 use crate::session::{Document, ShownCloud, TreeHandle};
 
 /// A request for a picture.
@@ -48,9 +54,9 @@ pub(crate) struct RenderRequest {
 
 /// A rendered picture and its data.
 pub(crate) struct Picture {
-    pub(crate) image: Arc<Image>,
+    pub(crate) pixels: Pixels,
     pub(crate) camera: Camera,
-    /// Size of the window's picture, pixels; `image` may be smaller.
+    /// Size of the window's picture, pixels; `pixels` may be fewer.
     pub(crate) size: [u32; 2],
     /// Whether the picture has full size and all points.
     pub(crate) whole: bool,
@@ -73,7 +79,7 @@ pub(crate) struct Picture {
 pub(crate) enum Answer {
     Picture(Box<Picture>),
     /// The last picture again, supersampled.
-    Finer(Arc<Image>),
+    Finer(Pixels),
     /// There is nothing to show.
     Empty,
     /// The device that renders, once known; `None` is the CPU.
@@ -97,6 +103,8 @@ struct Mailbox {
 struct Shared {
     post: Mutex<Mailbox>,
     news: Condvar,
+    /// The device of the window, once it is known.
+    window: OnceLock<WindowDevice>,
 }
 
 impl Shared {
@@ -129,12 +137,18 @@ pub(crate) struct RenderThread {
 impl RenderThread {
     /// Starts the thread. `context` is asked for a repaint with each answer.
     pub(crate) fn start(trees: TreeHandle, context: egui::Context) -> Self {
-        let shared = Arc::new(Shared { post: Mutex::default(), news: Condvar::new() });
+        let shared = Arc::new(Shared { post: Mutex::default(), news: Condvar::new(), window: OnceLock::new() });
         let (sender, answers) = channel();
         let outbox = Outbox { sender, context };
         let theirs = Arc::clone(&shared);
         crate::threads::spawn("render", move || thread::run(&theirs, &trees, &outbox));
         Self { shared, answers }
+    }
+
+    /// Tells the device of the window, before the first request.
+    pub(crate) fn share(&self, window: WindowDevice) {
+        // A second window would draw pictures from memory.
+        let _ = self.shared.window.set(window);
     }
 
     /// Replaces the request for a picture.

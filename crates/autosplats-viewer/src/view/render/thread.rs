@@ -3,18 +3,20 @@
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
-use autosplats::cloud::glam::{DMat4, DVec2};
+use autosplats::cloud::glam::DVec2;
 use autosplats::cloud::{Axes, PointCloud, check_memory};
 use autosplats::{
     Backend, ColorMode, Error, Frame, GBuffer, Image, Reconstruction, Renderer, SearchEngine, Settings,
-    still_supersample, usual_exposure,
+    still_supersample,
 };
 use rayon::prelude::*;
 
+use super::chosen::{Chosen, unless_too_large};
+use super::exposure::Exposure;
 use super::pace::{Costs, PointSubset, Reduction};
 use super::task::{Goal, Outcome, PickHit, enlarge};
-use super::{Answer, Depths, Outbox, Picture, RenderRequest, Shared, Task};
-use crate::session::{Document, LayerId, ShownCloud, Sight, TreeHandle};
+use super::{Answer, Depths, Outbox, Picture, Pixels, RenderRequest, Shared, Task, WindowDevice};
+use crate::session::{ShownCloud, Sight, TreeHandle};
 
 /// Colour that selected points are mixed with, sRGB.
 const SELECTION_COLOR: [u16; 3] = [255, 140, 20];
@@ -43,6 +45,7 @@ pub(super) fn run(shared: &Shared, trees: &TreeHandle, outbox: &Outbox) {
                 post = shared.news.wait(post).unwrap_or_else(PoisonError::into_inner);
             }
         };
+        studio.window = shared.window.get().filter(|_| !studio.is_window_lost).cloned();
         let finer = if let RenderJob::Finer(finer) = &work { Some(finer.clone()) } else { None };
         let work = std::panic::AssertUnwindSafe(|| match work {
             RenderJob::Task(task) => studio.perform(task, outbox).map(Answer::Done).map(Some),
@@ -63,6 +66,7 @@ pub(super) fn run(shared: &Shared, trees: &TreeHandle, outbox: &Outbox) {
             Err(error) => {
                 if matches!(error, Error::DeviceLost(_)) {
                     studio.renderer = None;
+                    studio.is_window_lost = true;
                 }
                 outbox.send(Answer::Failed(error.to_string()));
             }
@@ -89,47 +93,30 @@ struct RenderState {
     trees: TreeHandle,
     /// The job for when nothing is requested.
     finer: Option<Finer>,
-    renderer: Option<(Backend, Renderer)>,
+    /// The device of the window, if it is known and works.
+    window: Option<WindowDevice>,
+    is_window_lost: bool,
+    renderer: Option<Chosen>,
     costs: Costs,
     shown: Option<(Option<Axes>, Arc<ShownCloud>)>,
     sparse: Option<PointSubset>,
     exposure: Exposure,
 }
 
-/// The default brightness of colours. It is fixed by the first picture of a set of layers, so that edits and playing do
-/// not change the brightness.
-#[derive(Default)]
-struct Exposure {
-    found: Option<f32>,
-    /// The layers that `found` belongs to, with their tints.
-    layers: Vec<(LayerId, Option<[u8; 3]>)>,
-}
-
-impl Exposure {
-    fn of(&mut self, document: &Document, cloud: &PointCloud) -> f32 {
-        if document.layers.iter().any(|layer| layer.incomplete) {
-            // More points, and with them colours, may follow.
-            self.layers.clear();
-            return usual_exposure(cloud);
-        }
-        // Which nodes of octrees are there first is left to chance.
-        let samples: Vec<_> = document.trees().map(|(_, tree)| (&*tree.open.sample, DMat4::IDENTITY)).collect();
-        let layers: Vec<_> = document.layers.iter().map(|layer| (layer.id, layer.tint)).collect();
-        if self.layers != layers {
-            (self.found, self.layers) = (None, layers);
-        }
-        *self.found.get_or_insert_with(|| match &*samples {
-            [] => usual_exposure(cloud),
-            [(sample, _)] => usual_exposure(sample),
-            several => usual_exposure(&PointCloud::merged(several)),
-        })
-    }
-}
-
 impl RenderState {
     fn new(trees: TreeHandle) -> Self {
         let (costs, exposure) = (Costs::default(), Exposure::default());
-        Self { trees, finer: None, renderer: None, costs, shown: None, sparse: None, exposure }
+        Self {
+            trees,
+            finer: None,
+            window: None,
+            is_window_lost: false,
+            renderer: None,
+            costs,
+            shown: None,
+            sparse: None,
+            exposure,
+        }
     }
 
     /// The points that a wish shows; cached until they change.
@@ -153,21 +140,20 @@ impl RenderState {
     }
 
     fn renderer(&mut self, backend: Backend, outbox: &Outbox) -> Result<&mut Renderer, Error> {
-        if self.renderer.as_ref().is_none_or(|(known, _)| *known != backend) {
+        if self.renderer.as_ref().is_none_or(|chosen| chosen.backend != backend) {
             self.renderer = None;
             self.costs = Costs::default();
-            let renderer = Renderer::with_backend(backend)?;
-            outbox.send(Answer::Device(renderer.adapter()));
-            self.renderer = Some((backend, renderer));
+            let mut chosen = Chosen::new(backend, self.window.as_ref())?;
+            outbox.send(Answer::Device(chosen.renderer().adapter()));
+            self.renderer = Some(chosen);
         }
-        let (_, renderer) = self.renderer.as_mut().expect("it was made above");
-        Ok(renderer)
+        Ok(self.renderer.as_mut().expect("it was made above").renderer())
     }
 
     /// Frees the renderer when there is nothing to draw, since its buffers are as large as the largest picture and
     /// cloud so far. A renderer on a GPU stays, as it takes long to create.
     fn free_renderer(&mut self) {
-        self.renderer.take_if(|(_, renderer)| renderer.adapter().is_none());
+        self.renderer.take_if(|chosen| chosen.renderer().adapter().is_none());
         self.sparse = None;
     }
 
@@ -208,7 +194,9 @@ impl RenderState {
             self.sparse = Some(PointSubset::new(&shown, pace.halvings));
         }
         let exposure = self.exposure.of(&wish.document, &shown.cloud);
-        let Self { renderer: Some((_, renderer)), sparse, costs, finer, .. } = self else { return Ok(Answer::Empty) };
+        let Self { renderer: Some(chosen), sparse, costs, finer, .. } = self else {
+            return Ok(Answer::Empty);
+        };
         let part = sparse.as_ref().filter(|_| pace.halvings > 0);
         let cloud = part.map_or(&*shown.cloud, |sparse| &sparse.cloud);
         let size = wish.rendered_size(pace.scale);
@@ -217,16 +205,26 @@ impl RenderState {
         settings.shading.exposure.get_or_insert(exposure);
         // A GPU reads layers back only on request, which takes time. At rest the pointer needs depths.
         settings.all_layers = selected.is_some() || gpu && wish.budget_ms.is_none();
+        // What is selected is tinted in memory.
+        let texture = if selected.is_none() { chosen.texture(size)? } else { None };
+        // A picture within its time limit is short.
+        let turns = wish.budget_ms.is_none();
         let Frame { image, layers, counts, timings, .. } =
-            renderer.render_while(cloud, &wish.camera, size, &settings, go_on)?;
-        let Image { width, height, ref pixels, .. } = *image;
-        let mut image = Image { width, height, pixels: pixels.clone(), linear: Vec::new() };
-        if let Some(selected) = &selected {
-            tint(&mut image, layers, |point| {
-                let index = part.map_or(point, |sparse| sparse.indices[point as usize]);
-                selected.get(index as usize)
-            });
-        }
+            chosen.render((cloud, &wish.camera), (size, texture.as_deref()), &settings, turns, go_on)?;
+        let pixels = match texture {
+            Some(texture) => Pixels::Texture { texture, supersample: 1 },
+            None => {
+                let Image { width, height, ref pixels, .. } = *image;
+                let mut image = Image { width, height, pixels: pixels.clone(), linear: Vec::new() };
+                if let Some(selected) = &selected {
+                    tint(&mut image, layers, |point| {
+                        let index = part.map_or(point, |sparse| sparse.indices[point as usize]);
+                        selected.get(index as usize)
+                    });
+                }
+                Pixels::Image(Arc::new(image))
+            }
+        };
         if wish.budget_ms.is_none() && wish.dots.is_none() && still_supersample(wish.size) > 1 {
             settings.all_layers = selected.is_some();
             // The supersampled picture keeps the value range of this one.
@@ -236,7 +234,7 @@ impl RenderState {
         let depths = Depths::new(layers);
         costs.learn(cloud.len(), size[0] as usize * size[1] as usize, timings.project, timings.frame - timings.project);
         Ok(Answer::Picture(Box::new(Picture {
-            image: Arc::new(image),
+            pixels,
             camera: wish.camera,
             size: wish.size,
             whole: pace == Reduction::WHOLE,
@@ -257,13 +255,16 @@ impl RenderState {
         let Finer { wish, settings } = finer;
         let supersample = still_supersample(wish.size);
         let shown = self.shown(wish)?;
-        let Some((_, renderer)) = &mut self.renderer else { return Ok(None) };
+        let Some(chosen) = &mut self.renderer else { return Ok(None) };
         let size = wish.size.map(|side| side * supersample);
-        let frame = match renderer.render_while(&shown.cloud, &wish.camera, size, settings, go_on) {
-            Err(Error::DeviceLimit { .. } | Error::DeviceMemory(_)) => return Ok(None),
-            frame => frame?,
-        };
         let selected = shown.selected(&wish.document);
+        let texture = if selected.is_empty() { chosen.texture(size) } else { Ok(None) };
+        let Some(texture) = unless_too_large(texture)? else { return Ok(None) };
+        let frame = chosen.render((&shown.cloud, &wish.camera), (size, texture.as_deref()), settings, true, go_on);
+        let Some(frame) = unless_too_large(frame)? else { return Ok(None) };
+        if let Some(texture) = texture {
+            return Ok(Some(Answer::Finer(Pixels::Texture { texture, supersample })));
+        }
         let image = if selected.is_empty() {
             frame.image.averaged(supersample)
         } else {
@@ -272,7 +273,7 @@ impl RenderState {
             tint(&mut image, frame.layers, |point| selected.get(point as usize));
             image.averaged(supersample)
         };
-        Ok(Some(Answer::Finer(Arc::new(image))))
+        Ok(Some(Answer::Finer(Pixels::Image(Arc::new(image)))))
     }
 
     fn perform(&mut self, task: Task, outbox: &Outbox) -> Result<Outcome, Error> {
@@ -424,27 +425,10 @@ mod tests {
     use autosplats::cloud::glam::DVec3;
     use autosplats::{Camera, Projection};
 
-    use std::sync::{Condvar, Mutex};
+    use std::sync::{Condvar, Mutex, OnceLock};
 
     use super::*;
-    use crate::session::Layer;
-
-    #[test]
-    fn brightness_stays_while_layers_are_edited_and_play() {
-        let gray = |level| {
-            let cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3]; 100]).with_colors(vec![[level; 3]; 100]);
-            Arc::new(cloud.expect("as many"))
-        };
-        let [dark, bright] = [40, 200].map(gray);
-        let mut document = Document::default();
-        let id = document.add(Layer::new("cellar", None, Arc::clone(&dark)));
-        let mut exposure = Exposure::default();
-        assert!(exposure.of(&document, &dark) > 4.0);
-        assert_eq!(exposure.of(&document, &bright), usual_exposure(&dark), "the next frame of the same");
-        document.remove(id);
-        document.add(Layer::new("yard", None, Arc::clone(&bright)));
-        assert_eq!(exposure.of(&document, &bright), 1.0, "another file");
-    }
+    use crate::session::Document;
 
     fn wish(color: ColorMode, engine: SearchEngine) -> RenderRequest {
         let projection = Projection::PerspectiveFovDeg(40.0);
@@ -462,7 +446,7 @@ mod tests {
     fn a_whole_picture_is_given_up_when_the_view_moves() {
         let whole = wish(ColorMode::Auto, SearchEngine::ScreenGrid);
         let moving = RenderRequest { budget_ms: Some(30.0), ..whole.clone() };
-        let shared = Shared { post: Mutex::default(), news: Condvar::new() };
+        let shared = Shared { post: Mutex::default(), news: Condvar::new(), window: OnceLock::new() };
         let post = |wish: Option<&RenderRequest>| shared.lock().wish = wish.cloned();
         assert!(!shared.should_give_up(&whole), "nothing is asked for");
         post(Some(&whole));

@@ -12,7 +12,7 @@ use super::pitch;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReadPicture<'a> {
     pub(crate) size: [u32; 2],
-    /// Bytes of [`ShadeBuffers::image`](super::ShadeBuffers::image).
+    /// Bytes of [`ShadeBuffers::image`](super::ShadeBuffers::image); empty if the picture stays on the device.
     pub(crate) image: &'a [u8],
     /// Bytes of [`ShadeBuffers::linear`](super::ShadeBuffers::linear); empty if not requested.
     pub(crate) linear: &'a [u8],
@@ -28,14 +28,18 @@ pub(crate) fn finish(
     shading: &Shading,
     image: &mut Image,
 ) -> Option<[f64; 2]> {
-    let [width, height] = read.size;
-    image.width = width;
-    image.height = height;
-    image.pixels.resize(width as usize * height as usize, [0; 4]);
-    let rows = read.image.par_chunks(4 * pitch(width) as usize);
-    image.pixels.par_chunks_mut(width as usize).zip(rows).for_each(|(pixels, row)| {
-        bytemuck::cast_slice_mut(pixels).copy_from_slice(&row[..4 * width as usize]);
-    });
+    if read.image.is_empty() {
+        *image = Image::default();
+    } else {
+        let [width, height] = read.size;
+        image.width = width;
+        image.height = height;
+        image.pixels.resize(width as usize * height as usize, [0; 4]);
+        let rows = read.image.par_chunks(4 * pitch(width) as usize);
+        image.pixels.par_chunks_mut(width as usize).zip(rows).for_each(|(pixels, row)| {
+            bytemuck::cast_slice_mut(pixels).copy_from_slice(&row[..4 * width as usize]);
+        });
+    }
     let linear = read.linear.par_chunks_exact(size_of::<[f32; 4]>());
     linear
         .map(|bytes| bytemuck::pod_read_unaligned(&bytes[..size_of::<[f32; 3]>()]))
@@ -44,7 +48,7 @@ pub(crate) fn finish(
     let range = scene
         .given_range(shading)
         .unwrap_or_else(|| scene.range_above_noise(&shading.color, read.range.map(f32::from_bits)));
-    if shading.legend {
+    if shading.legend && !read.image.is_empty() {
         let scale = Scale::new(shading.color_map.unwrap_or(map), range);
         let table = encode_table();
         let world = |range| scene.world_range(&shading.color, range);

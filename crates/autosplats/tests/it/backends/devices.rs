@@ -101,7 +101,8 @@ fn a_callers_texture_gets_the_same_picture() {
     let size = [250, 170];
     let settings = Settings::default();
     renderer.upload(&cloud, &settings, &|_| true).expect("an upload");
-    let expected = renderer.render(&cloud, &camera, size, &settings).expect("a picture").image.clone();
+    let frame = renderer.render(&cloud, &camera, size, &settings).expect("a picture");
+    let (expected, counts) = (frame.image.clone(), frame.counts);
     let texture = |format, usage| {
         device.create_texture(&wgpu::TextureDescriptor {
             label: None,
@@ -120,8 +121,36 @@ fn a_callers_texture_gets_the_same_picture() {
         renderer.render_to_texture(&cloud, &camera, &texture, &settings).expect("a picture in a texture");
         let pixels = read_texture(&device, &queue, &texture, size);
         let expected = expected.pixels.iter().map(|&[r, g, b, a]| if swapped { [b, g, r, a] } else { [r, g, b, a] });
-        assert!(pixels.into_iter().eq(expected), "{format:?}");
+        let expected: Vec<[u8; 4]> = expected.collect();
+        assert_eq!(pixels, expected, "{format:?}");
     }
+    for turns in [false, true] {
+        for all_layers in [false, true] {
+            let own = renderer.texture(size, wgpu::TextureFormat::Rgba8Unorm).expect("a texture");
+            assert!(own.usage().contains(wgpu::TextureUsages::TEXTURE_BINDING), "the window's shader reads it");
+            let texture = texture(wgpu::TextureFormat::Rgba8Unorm, both);
+            renderer.take_turns(turns);
+            let settings = Settings { all_layers, ..settings.clone() };
+            let frame = renderer.render_to_texture_while(&cloud, &camera, &own, &settings, &|| true);
+            assert_eq!(frame.expect("a picture").counts, counts, "of another texture");
+            let frame = renderer.render_to_texture_while(&cloud, &camera, &texture, &settings, &|| true);
+            let frame = frame.expect("a picture in a texture");
+            assert_eq!(frame.counts, counts);
+            assert!(frame.image.pixels.is_empty(), "the picture stays on the device");
+            assert_eq!(frame.layers.depth.is_empty(), !all_layers);
+            assert!(frame.timings.frame > 0.0 && frame.timings.project > 0.0, "{:?}", frame.timings);
+            assert_eq!(read_texture(&device, &queue, &texture, size), expected.pixels, "turns {turns}");
+        }
+    }
+    let refused = renderer.render_to_texture_while(
+        &cloud,
+        &camera,
+        &texture(wgpu::TextureFormat::Rgba8Unorm, both),
+        &settings,
+        &|| false,
+    );
+    assert!(matches!(refused, Err(Error::Cancelled)));
+    assert!(matches!(renderer.texture([1 << 20, 1], wgpu::TextureFormat::Rgba8Unorm), Err(Error::DeviceLimit { .. })));
     let wrong = [
         texture(wgpu::TextureFormat::R32Float, both),
         texture(wgpu::TextureFormat::Rgba8Unorm, both - wgpu::TextureUsages::COPY_DST),

@@ -8,6 +8,7 @@ use crate::camera::{Camera, Projection, ViewDirection, guess_axes};
 use crate::gpu::{Clock, Groups, Recorder, Step, test_gpu};
 use crate::points::Points;
 use crate::renderer::gpu::GpuRenderer;
+use crate::renderer::texture::Destination;
 use crate::renderer::{Reconstruction, Settings};
 
 /// Numbers of one frame.
@@ -81,7 +82,8 @@ fn dispatches_of_a_frame() {
     let commands = |reconstruction| {
         let settings = Settings { reconstruction, ..Settings::default() };
         let mut renderer = GpuRenderer::new(gpu.clone()).expect("a renderer");
-        renderer.render(Points::Cloud(&cloud), &camera, [64, 48], &settings, 1.0, &|| true).expect("a picture");
+        let size = Destination::Memory([64, 48]);
+        renderer.render(Points::Cloud(&cloud), &camera, size, &settings, 1.0, &|| true).expect("a picture");
         Commands::of(&renderer)
     };
     let usual = commands(Reconstruction::default());
