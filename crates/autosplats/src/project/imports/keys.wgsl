@@ -4,7 +4,7 @@
 //
 // Keys are empty between frames, so none clears them. `compact` empties what it lists, `occupancy` what it erases.
 // The steps of projection are submitted together, and a submission runs whole or not at all. A device that fails while
-// it runs is lost, with its buffers. The host gives up no frame between these steps: where each is timed by itself, each
+// it runs is lost, with its buffers. The host gives up no frame between these: where each is timed by itself, each
 // is a submission, and all are made. Every slot is visited, whatever the counters say.
 
 struct Key {
