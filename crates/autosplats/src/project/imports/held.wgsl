@@ -1,5 +1,5 @@
-// Which slots hold points. Each projected point marks its sixteenth, and the nearest owns the slot. So a slot is owned
-// until `occupancy` erases owners, if and only if one of its sixteenths is marked. Sixteenths are an eighth of the bytes
+// Which slots hold points. Each projected point marks its sixteenth, and the nearest owns the slot. So it is owned,
+// until `occupancy` erases owners, exactly if one of its sixteenths is marked. They are an eighth of the bytes
 // of keys. The including pass binds `sixteenths` for reading.
 
 #import frame

@@ -2,10 +2,10 @@
 // zero, as new buffers are. Positive floats have the order of their bits: as a 64-bit number, a key is the larger the
 // nearer its point is, then the lower its ordinal.
 //
-// Keys are empty between frames, so no frame clears them. `compact` empties what it lists, `occupancy` what it erases.
+// Keys are empty between frames, so none clears them. `compact` empties what it lists, `occupancy` what it erases.
 // The steps of projection are submitted together, and a submission runs whole or not at all. A device that fails while
-// it runs is lost, with its buffers. No host waits between these steps, so no frame is given up there. Every slot is
-// visited, whatever the counters say. Tests that time each pass submit all of them too.
+// it runs is lost, with its buffers. The host gives up no frame between these: where each is timed by itself, each
+// is a submission, and all are made. Every slot is visited, whatever the counters say.
 
 struct Key {
     // Inverted ordinal of the point; 0 in an empty slot, because no ordinal is the largest number.
