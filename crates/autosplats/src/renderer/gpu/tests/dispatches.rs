@@ -96,5 +96,8 @@ fn dispatches_of_a_frame() {
         commands(Reconstruction { adaptive: false, points_per_pixel: 1, trim: false, ..Reconstruction::default() });
     // Hardware has seven dispatches less, as it fills several levels of cells by one, and two more for long searches.
     assert_eq!(usual, Commands { dispatches: 53, single: 8, indirect: 29, passes: 1, chain: 49, bound_kb: 59_867 });
-    assert_eq!(of_the_paper, Commands { dispatches: 30, single: 0, indirect: 20, passes: 1, chain: 28, bound_kb: 44_976 });
+    assert_eq!(
+        of_the_paper,
+        Commands { dispatches: 30, single: 0, indirect: 20, passes: 1, chain: 28, bound_kb: 44_976 }
+    );
 }
