@@ -24,13 +24,8 @@ Frames cathedral:10M 1760x900 default cpu, \
 Frames statue:1M 1760x900 default gpu, Frames statue:1M 1760x900 noise gpu, Frames statue:1M 1760x900 paper gpu, \
 Frames statue:1M 3840x2160 default gpu, Frames cathedral:3M 1760x900 default gpu, \
 Frames cathedral:10M 1760x900 default gpu, Frames cathedral:100M 1760x900 default gpu, \
-Work statue:1M 1760x900 default, Work statue:1M 1760x900 paper, Work cathedral:3M 1760x900 default, \
 Normals statue:1M 10, Normals statue:1M 40, Normals cathedral:10M 10, Reading ply, Reading pcd, Reading las, \
 Reading laz, Reading e57, Reading xyz, Memory statue:1M, Memory cathedral:10M";
-
-const STAGES: [&str; 6] = ["project", "search", "fit", "adapt", "splat", "shade"];
-/// Bandwidths in gigabytes a second at which the bytes of a frame are timed, by the names of their columns.
-const BANDWIDTHS_GB_S: [(&str, f64); 3] = [("4300", 4300.0), ("360", 360.0), ("60", 60.0)];
 
 /// Numbers of a row, by the names of their columns.
 type Numbers = BTreeMap<&'static str, f64>;
@@ -41,9 +36,7 @@ pub(super) fn all(program: &Path, only: &str) -> Result<Value> {
     let program = Program { path: program, folder: folder.path() };
     let doctor = program.json(&["doctor", "--json"])?;
     let gpu = doctor["adapters"].as_array().into_iter().flatten().find(|adapter| adapter["software"] == false);
-    let has_device = doctor["adapters"].as_array().is_some_and(|adapters| !adapters.is_empty());
-    let can = |job: &str| (gpu.is_some() || !job.ends_with("gpu")) && (has_device || !job.starts_with("Work"));
-    let jobs = JOBS.split(", ").filter(|job| job.contains(only) && can(job));
+    let jobs = JOBS.split(", ").filter(|job| job.contains(only) && (gpu.is_some() || !job.ends_with("gpu")));
     let mut jobs: Vec<_> = jobs.map(|job| (job, Vec::new())).collect();
     ensure!(!jobs.is_empty(), "no job of this machine contains '{only}'");
     for round in 1..=ROUNDS {
@@ -84,12 +77,18 @@ impl Program<'_> {
         let number = |value: &Value| value.as_f64().context("the program's JSON lacks a number");
         match job.split(' ').collect::<Vec<_>>()[..] {
             ["Frames", scene, size, settings, on] => {
-                let run = &self.bench(["10", scene, size, on], settings)?;
-                let times = STAGES.into_iter().chain(["frame"]).map(|stage| (stage, &run["timings_ms"][stage]));
-                let times = times.chain([("picture", &run["picture_ms"])]);
+                let options: &[&str] = match settings {
+                    "paper" => &["-k", "10", "--points-per-pixel", "1", "--no-trim"],
+                    "noise" => &["--noise", "0.005"],
+                    _ => &[],
+                };
+                let bench = ["bench", "--json", "--frames", "10", "--scene", scene, "--size", size, "--backend", on];
+                let run = &self.json(&[&bench, options].concat())?["runs"][0];
+                let stages = ["project", "search", "fit", "adapt", "splat", "shade", "frame"];
+                let times = stages.map(|stage| (stage, &run["timings_ms"][stage]));
+                let times = times.into_iter().chain([("picture", &run["picture_ms"])]);
                 times.map(|(key, ms)| Ok((key, number(ms)?))).collect()
             }
-            ["Work", scene, size, settings] => work(&self.bench(["1", scene, size, "gpu"], settings)?["work"]),
             ["Normals", cloud, k] => {
                 let file = self.file(cloud, "ply")?;
                 let start = Instant::now();
@@ -119,17 +118,6 @@ impl Program<'_> {
         }
     }
 
-    /// The run of a bench: its number of frames, scene, size and backend.
-    fn bench(&self, [frames, scene, size, on]: [&str; 4], settings: &str) -> Result<Value> {
-        let options: &[&str] = match settings {
-            "paper" => &["-k", "10", "--points-per-pixel", "1", "--no-trim"],
-            "noise" => &["--noise", "0.005"],
-            _ => &[],
-        };
-        let bench = ["bench", "--json", "--frames", frames, "--scene", scene, "--size", size, "--backend", on];
-        Ok(self.json(&[&bench, options].concat())?["runs"][0].take())
-    }
-
     /// The name of a file with the points of a scene. Writes it once.
     fn file(&self, cloud: &str, extension: &str) -> Result<String> {
         let name = format!("{}.{extension}", cloud.replace(':', "-"));
@@ -150,24 +138,6 @@ impl Program<'_> {
     }
 }
 
-/// The row of a frame's work, from the stages of a bench. A stage that is not there binds nothing.
-fn work(stages: &Value) -> Result<Numbers> {
-    let stages = stages.as_array().filter(|stages| !stages.is_empty()).context("the bench lacks the work of a GPU")?;
-    let mut numbers: Numbers = STAGES.map(|stage| (stage, 0.0)).into();
-    numbers.extend([("dispatches", 0.0), ("MB", 0.0)]);
-    for stage in stages {
-        let number = |key: &str| stage[key].as_f64().with_context(|| format!("the work of a stage lacks {key}"));
-        let name = STAGES.into_iter().find(|name| stage["stage"] == *name).context("a stage of another name")?;
-        let mb = number("bound_bytes")? * 1e-6;
-        for (key, more) in [(name, mb), ("MB", mb), ("dispatches", number("dispatches")?)] {
-            *numbers.entry(key).or_default() += more;
-        }
-    }
-    let mb = numbers["MB"];
-    numbers.extend(BANDWIDTHS_GB_S.map(|(key, gb_s)| (key, mb / gb_s)));
-    Ok(numbers)
-}
-
 /// Peak resident memory in megabytes, from the status of a process. Only Linux has such a file.
 fn peak_mb(status: &str) -> Option<f64> {
     let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB"))?;
@@ -184,20 +154,6 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_work_of_stages_is_added_up() {
-        let stages = json!([
-            {"stage": "project", "dispatches": 9, "bound_bytes": 100_000_000},
-            {"stage": "shade", "dispatches": 1, "bound_bytes": 20_000_000},
-        ]);
-        let numbers = work(&stages).expect("numbers");
-        let wanted = [("dispatches", 10.0), ("project", 100.0), ("fit", 0.0), ("MB", 120.0), ("60", 2.0)];
-        assert!(wanted.iter().all(|(key, number)| numbers[key] == *number), "{numbers:?}");
-        for wrong in [json!([]), json!(null), json!([{"stage": "project"}]), json!([{"stage": "other"}])] {
-            assert!(work(&wrong).is_err(), "{wrong}");
-        }
-    }
 
     #[test]
     fn peaks_and_medians_are_found() {

@@ -23,18 +23,8 @@ Written by `cargo xtask performance`. Changes here are lost.
 
 /// Per table its title, a text, its columns of words and its columns of numbers. The rows are the list of that title in
 /// each machine's file, and the columns are keys of a row.
-const TABLES: [[&str; 4]; 6] = [
+const TABLES: [[&str; 4]; 5] = [
     ["Frames", "In milliseconds.", "scene size settings on", "project search fit adapt splat shade frame picture"],
-    [
-        "Work",
-        "Of a frame on a GPU: dispatches, and megabytes of the buffers that they bind, twice where they may write them. \
-         That bounds what a frame moves, as buffers have room for the worst case. The last columns are milliseconds \
-         for these bytes at 4300 GB/s (read by an H200 here), 360 (an RTX 3060) and 60 (shared memory of a notebook). \
-         Software has more dispatches than hardware. **Predicted, not measured**, of an H200 after 0052 and 0058: \
-         statue:1M 1.15 ms, with the paper's settings 0.65, cathedral:10M 2.9, all by 30 % more or less.",
-        "scene size settings",
-        "dispatches project search fit adapt splat shade MB 4300 360 60",
-    ],
     ["Normals", "Seconds of `autosplats normals`. It reads a PLY file and writes one.", "cloud k", "s"],
     ["Reading", "Files of `scene:statue:2M` with colours, in the page cache.", "format", "ms Mpoints/s"],
     ["Memory", "Of `autosplats render` at 1760x900, from a PLY file. Its mapped pages count.", "cloud", "peak-MB"],

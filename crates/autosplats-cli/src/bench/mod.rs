@@ -5,7 +5,7 @@ mod paper;
 
 use std::time::{Duration, Instant};
 
-use autosplats::{Counts, PassTime, Renderer, Settings, StageWork, Timings};
+use autosplats::{Counts, PassTime, Renderer, Settings, Timings};
 use autosplats_cloud::PointCloud;
 use autosplats_scenes::SCENE_PREFIX;
 use serde::Serialize;
@@ -68,9 +68,6 @@ struct Run {
     /// The frame's time that no pass took; only if each pass is timed.
     #[serde(skip_serializing_if = "Option::is_none")]
     between_passes_ms: Option<f64>,
-    /// Dispatches and bound bytes of each stage; only on a GPU.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    work: Vec<StageWork>,
     /// Clock of the device's processors while it rendered, where its driver tells.
     #[serde(skip_serializing_if = "Option::is_none")]
     clock: Option<Clock>,
@@ -186,7 +183,6 @@ fn measure(
         passes: passes.collect(),
         between_passes_ms: (args.passes && renderer.adapter().is_some()).then(|| median(between)),
         clock: clocks.and_then(ClockReader::finish),
-        work: renderer.stage_work(),
         unconverged: renderer.convergence()?,
         device,
     })

@@ -30,5 +30,4 @@ pub(crate) use raster::{DepthMask, Draw, Load, RasterPass, Target, Targets};
 pub use recorder::PassTime;
 pub(crate) use recorder::{Clock, DISPATCH_BYTES, Recorder, stage_ms};
 pub(crate) use source::{PassSource, passes};
-pub use step::StageWork;
 pub(crate) use step::{Groups, Step};

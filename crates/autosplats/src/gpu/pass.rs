@@ -44,6 +44,7 @@ impl Pass {
                 label: label.clone(),
                 pipeline,
                 layout: made.layout,
+                #[cfg(test)]
                 writes: entries.iter().map(is_written).collect(),
             }
         })
@@ -71,18 +72,21 @@ impl Pass {
             path: self.path,
             label: self.label.clone(),
             work,
+            #[cfg(test)]
             uses: resources.iter().zip(&self.writes).filter_map(use_of).collect(),
         }
     }
 }
 
 /// Whether a pass may write a binding.
+#[cfg(test)]
 fn is_written(entry: &wgpu::BindGroupLayoutEntry) -> bool {
     let wgpu::BindingType::Buffer { ty, .. } = entry.ty else { return false };
     ty == wgpu::BufferBindingType::Storage { read_only: false }
 }
 
 /// The buffer of a binding, with whether it may be written.
+#[cfg(test)]
 fn use_of((resource, writes): (&wgpu::BindingResource<'_>, &bool)) -> Option<(wgpu::Buffer, bool)> {
     let wgpu::BindingResource::Buffer(bound) = resource else { return None };
     Some((bound.buffer.clone(), *writes))

@@ -24,6 +24,7 @@ pub(crate) struct Step {
     pub(super) label: String,
     pub(super) work: StepWork,
     /// Bound buffers, each with whether the pass may write it.
+    #[cfg(test)]
     pub(crate) uses: Vec<(wgpu::Buffer, bool)>,
 }
 
@@ -41,36 +42,7 @@ impl Step {
     }
 }
 
-/// What a stage of a frame asks of the device.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct StageWork {
-    /// The stage, such as `project`.
-    pub stage: &'static str,
-    /// Number of dispatches.
-    pub dispatches: usize,
-    /// Bytes of all buffers that the dispatches bind, twice where they may write them. A dispatch that reads nothing
-    /// twice, past the caches, moves as much at most. Buffers have room for the worst case, so it mostly moves less.
-    pub bound_bytes: u64,
-}
-
-impl StageWork {
-    /// The work of each stage that has steps which compute, in the order of the stages' first steps.
-    pub(crate) fn of(steps: &[Step]) -> Vec<Self> {
-        let mut all: Vec<Self> = Vec::new();
-        for step in steps.iter().filter(|step| step.groups().is_some()) {
-            let stage = step.stage();
-            let at = all.iter().position(|work| work.stage == stage).unwrap_or_else(|| {
-                all.push(Self { stage, dispatches: 0, bound_bytes: 0 });
-                all.len() - 1
-            });
-            let bytes = |(buffer, writes): &(wgpu::Buffer, bool)| buffer.size() * if *writes { 2 } else { 1 };
-            all[at].dispatches += 1;
-            all[at].bound_bytes += step.uses.iter().map(bytes).sum::<u64>();
-        }
-        all
-    }
-}
-
+#[cfg(test)]
 impl Step {
     /// Number of workgroups of a step that computes.
     pub(crate) fn groups(&self) -> Option<&Groups> {
@@ -92,6 +64,7 @@ impl Step {
             path: last.path,
             label: last.label.clone(),
             work: StepWork::Raster(Raster { targets, draws }),
+            #[cfg(test)]
             uses: Vec::new(),
         }
     }

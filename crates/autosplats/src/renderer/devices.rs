@@ -3,7 +3,7 @@
 use super::gpu::GpuRenderer;
 use super::{BackendRenderer, Renderer};
 use crate::Error;
-use crate::gpu::{AdapterSummary, Gpu, StageWork};
+use crate::gpu::{AdapterSummary, Gpu};
 
 impl Renderer {
     /// Creates a renderer on the device that `which` names: by its index in [`adapters`](crate::adapters), or by its
@@ -77,14 +77,6 @@ impl Renderer {
     pub fn take_turns(&mut self, take: bool) {
         if let BackendRenderer::Gpu(renderer) = &mut self.form {
             renderer.take_turns(take);
-        }
-    }
-
-    /// What each stage of the last frame asked of the device. Empty on the CPU and before the first frame.
-    pub fn stage_work(&self) -> Vec<StageWork> {
-        match &self.form {
-            BackendRenderer::Cpu(_) => Vec::new(),
-            BackendRenderer::Gpu(renderer) => renderer.stage_work(),
         }
     }
 

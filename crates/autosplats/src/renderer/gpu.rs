@@ -23,7 +23,7 @@ use crate::cancel::NEVER;
 use crate::fit::Surfel;
 use crate::fit::orient::Sensors;
 use crate::fit::orient::gpu::{sensor_buffer, write_sensors};
-use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, StageWork, stage_ms};
+use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, stage_ms};
 use crate::points::Points;
 use crate::project::gpu::{Counter, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, SlotTable, Uploader};
@@ -110,11 +110,6 @@ impl GpuRenderer {
 
     pub(super) fn adapter(&self) -> AdapterSummary {
         self.gpu.summary()
-    }
-
-    /// See [`Renderer::stage_work`](super::Renderer::stage_work).
-    pub(super) fn stage_work(&self) -> Vec<StageWork> {
-        self.prepared.as_ref().map_or_else(Vec::new, |prepared| StageWork::of(&prepared.steps))
     }
 
     /// See [`Renderer::time_passes`](super::Renderer::time_passes).
