@@ -40,9 +40,10 @@ usage: cargo xtask test               runs every check of CI: rules, lints, docu
        cargo xtask performance --page | --machine NAME [--only TEXT] [--program PATH --commit HASH]
                                   docs/PERFORMANCE.md, from docs/performance/*.json; NAME.json is measured first, in some ten
                                   minutes, with --only those jobs that contain TEXT, as gpu does, with --program another build
-       cargo xtask card [--program PATH]
-                                  where the time of a frame goes on a graphics card, by stages and by passes; some six
-                                  minutes; the program is built unless it is given
+       cargo xtask card [--page | [--program PATH] [--commit HASH]]
+                                  where the time of a frame goes on a graphics card, by stages and by passes, in some six
+                                  minutes; without a card only what is counted. Writes docs/performance/gpu/DEVICE.json
+                                  and docs/performance/GPU.md. The program is built unless it is given
        cargo xtask pictures OUT [--program PATH]
                                   a fixed list of pictures, layers and normals in the empty folder OUT, with a hash of each
        cargo xtask pictures --compare BEFORE AFTER
@@ -70,11 +71,7 @@ fn main() -> ExitCode {
         ["formats", "--program", program] => root().and_then(|root| formats::write(root, program.as_ref())),
         ["formats", "--check"] => root().and_then(|root| formats::check(root, &formats::build(root)?)),
         ["performance", options @ ..] => root().and_then(|root| performance::run(root, options)),
-        ["card"] => root().and_then(|root| build_command(root, "dist")).map(|program| card::run(&program)),
-        ["card", "--program", program] => {
-            card::run(program.as_ref());
-            Ok(())
-        }
+        ["card", options @ ..] => root().and_then(|root| card::run(root, options)),
         ["pictures", "--compare", before, after] => {
             root().and_then(|root| pictures::run(root, &pictures::Task::Compare([before.as_ref(), after.as_ref()])))
         }

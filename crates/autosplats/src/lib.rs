@@ -53,7 +53,7 @@ pub use detail::{
     Choice, Coarsest, Detail, NodePoints, PlacedTree, Shown, TreeScene, choose, choose_loading, load_nodes,
 };
 pub use error::{Error, MAX_SIDE};
-pub use gpu::{AdapterSummary, PassTime, adapters, device_descriptor};
+pub use gpu::{AdapterSummary, PassTime, StageWork, adapters, device_descriptor};
 pub use normals::{
     NormalSettings, Normals, NormalsInParts, Orientation, PartsOptions, Viewpoint, estimate_normals,
     estimate_normals_in_parts,

@@ -2,7 +2,7 @@
 //! and writes `docs/PERFORMANCE.md` from all files there.
 
 mod measure;
-mod page;
+pub(crate) mod page;
 
 use std::collections::BTreeMap;
 use std::fs::{read_dir, read_to_string, write};
@@ -12,6 +12,7 @@ use std::process::Command;
 use anyhow::{Context as _, Result, ensure};
 use serde_json::Value;
 
+use self::page::PERFORMANCE;
 use crate::build_command;
 
 /// One JSON file per machine: what it is, the commit, the date, and a list of rows for each table.
@@ -34,32 +35,37 @@ pub(crate) fn run(root: &Path, words: &[&str]) -> Result<()> {
         let mut results = measure::all(&program, options.get("--only").copied().unwrap_or_default())?;
         results["commit"] = commit.into();
         results["date"] = answer(Command::new("date").args(["-u", "+%F"]))?.into();
-        // A line per row.
-        let text = results.to_string().replace("[{", "[\n{").replace("},{", "},\n{") + "\n";
-        let path = root.join(FOLDER).join(format!("{machine}.json"));
-        write(&path, text).with_context(|| path.display().to_string())?;
+        write_results(&root.join(FOLDER).join(format!("{machine}.json")), &results)?;
         if machine.contains(['/', '\\']) {
             return Ok(());
         }
     }
-    write(root.join(PAGE), page::page(&machines(root)?)).context(PAGE)
+    write(root.join(PAGE), page::page(&PERFORMANCE, &machines(&root.join(FOLDER))?)).context(PAGE)
+}
+
+/// Writes a file of results, with a line per row.
+pub(crate) fn write_results(path: &Path, results: &Value) -> Result<()> {
+    let text = results.to_string().replace("[{", "[\n{").replace("},{", "},\n{") + "\n";
+    write(path, text).with_context(|| path.display().to_string())
 }
 
 /// What a command prints.
-fn answer(command: &mut Command) -> Result<String> {
+pub(crate) fn answer(command: &mut Command) -> Result<String> {
     let output = command.output().with_context(|| format!("cannot start {}", command.get_program().display()))?;
     let message = String::from_utf8_lossy(&output.stderr);
     ensure!(output.status.success(), "{:?}: {}", command.get_args().collect::<Vec<_>>(), message.trim());
     Ok(String::from_utf8(output.stdout)?.trim().to_owned())
 }
 
-/// Each machine's name and file, in the order of names.
-fn machines(root: &Path) -> Result<BTreeMap<String, Value>> {
+/// Each machine's name and file in a folder of such files, in the order of names.
+pub(crate) fn machines(folder: &Path) -> Result<BTreeMap<String, Value>> {
     let read = |path: PathBuf| -> Result<_> {
         let file = serde_json::from_str(&read_to_string(&path)?).with_context(|| path.display().to_string())?;
         Ok((path.file_stem().unwrap_or_default().display().to_string(), file))
     };
-    read_dir(root.join(FOLDER)).context(FOLDER)?.map(|entry| read(entry?.path())).collect()
+    let entries = read_dir(folder).with_context(|| folder.display().to_string())?;
+    let paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
+    paths.into_iter().filter(|path| path.extension().is_some_and(|end| end == "json")).map(read).collect()
 }
 
 #[cfg(test)]
@@ -69,7 +75,7 @@ mod tests {
     #[test]
     fn the_page_is_small_and_what_the_files_give() {
         let root = crate::root().expect("the repository");
-        let page = page::page(&machines(root).expect("files of results"));
+        let page = page::page(&PERFORMANCE, &machines(&root.join(FOLDER)).expect("files of results"));
         assert!(page.len() <= 8_000, "{} bytes: leave out rows or files, as `lengths.rs` says", page.len());
         let there = read_to_string(root.join(PAGE)).expect("the page");
         assert!(there == page, "{PAGE} is not up to date: cargo xtask performance --page writes it");

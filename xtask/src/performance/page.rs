@@ -1,4 +1,4 @@
-//! The text of `docs/PERFORMANCE.md`, from files of results alone.
+//! Pages of measurements, from files of results alone, and the text of `docs/PERFORMANCE.md`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -16,14 +16,24 @@ Written by `cargo xtask performance`. Changes here are lost.
 - Machines are shared with other work: times vary by a third. Compare results of one machine and commit only.
 - Settings: *paper* is `-k 10 --points-per-pixel 1 --no-trim`; *noise* is `--noise 0.005` with the default settings.
 - Stages of a GPU are timed by the GPU. *picture* ends when the picture is in main memory.
+- [Stages beside their bytes](performance/GPU.md).
 
 ## Machines
 
 ";
 
+/// A page: its head, and its tables.
+pub(crate) struct Page {
+    pub(crate) head: &'static str,
+    pub(crate) tables: &'static [Table],
+}
+
+/// The page of all that this task measures.
+pub(super) const PERFORMANCE: Page = Page { head: HEAD, tables: &TABLES };
+
 /// Per table its title, a text, its columns of words and its columns of numbers. The rows are the list of that title in
 /// each machine's file, and the columns are keys of a row.
-const TABLES: [[&str; 4]; 5] = [
+const TABLES: [Table; 5] = [
     ["Frames", "In milliseconds.", "scene size settings on", "project search fit adapt splat shade frame picture"],
     ["Normals", "Seconds of `autosplats normals`. It reads a PLY file and writes one.", "cloud k", "s"],
     ["Reading", "Files of `scene:statue:2M` with colours, in the page cache.", "format", "ms Mpoints/s"],
@@ -39,21 +49,24 @@ const TABLES: [[&str; 4]; 5] = [
     ],
 ];
 
+/// Title, text, columns of words and columns of numbers.
+pub(crate) type Table = [&'static str; 4];
+
 /// The columns of words of a table.
 pub(super) fn words(title: &str) -> impl Iterator<Item = &'static str> {
     TABLES.into_iter().filter(move |table| table[0] == title).flat_map(|table| table[2].split(' '))
 }
 
 /// The whole page, from each machine's name and file.
-pub(super) fn page(machines: &BTreeMap<String, Value>) -> String {
-    let mut page = HEAD.to_owned();
+pub(crate) fn page(Page { head, tables }: &Page, machines: &BTreeMap<String, Value>) -> String {
+    let mut page = (*head).to_owned();
     for (name, file) in machines {
         let [machine, commit, date] = ["machine", "commit", "date"].map(|key| cell(&file[key]));
         let _ = writeln!(page, "- **{name}**: {machine}. Commit {commit}, {date}.");
     }
-    for [title, about, words, numbers] in TABLES {
+    for [title, about, words, numbers] in *tables {
         // A table without rows is left out.
-        if machines.values().all(|file| file[title].as_array().is_none_or(Vec::is_empty)) {
+        if machines.values().all(|file| file[*title].as_array().is_none_or(Vec::is_empty)) {
             continue;
         }
         let row = |first: &str, cell: &dyn Fn(&str) -> String| {
@@ -63,7 +76,7 @@ pub(super) fn page(machines: &BTreeMap<String, Value>) -> String {
         let rule = words.split(' ').map(|_| "---|").chain(numbers.split(' ').map(|_| "--:|")).collect::<String>();
         let _ = write!(page, "\n## {title}\n\n{about}\n\n{}|---|{rule}\n", row("machine", &str::to_owned));
         for (name, file) in machines {
-            for values in file[title].as_array().into_iter().flatten() {
+            for values in file[*title].as_array().into_iter().flatten() {
                 page += &row(name, &|key| cell(&values[key]));
             }
         }
@@ -92,7 +105,7 @@ mod tests {
         let rows =
             serde_json::json!([{"format": "ply", "ms": 7.058, "Mpoints/s": 12.84}, {"format": "laz", "ms": 73369.2}]);
         let file = serde_json::json!({"machine": "a CPU", "commit": "abc", "date": "2026-01-02", "Reading": rows});
-        let page = page(&BTreeMap::from([("one".to_owned(), file)]));
+        let page = page(&PERFORMANCE, &BTreeMap::from([("one".to_owned(), file)]));
         let table = "| machine | format | ms | Mpoints/s |\n|---|---|--:|--:|\n\
                      | one | ply | 7.06 | 12.8 |\n| one | laz | 73369 | – |\n";
         assert!(page.ends_with(table) && page.matches("\n## ").count() == 2, "no table without rows: {page}");

@@ -49,7 +49,8 @@ pub(crate) struct BenchArgs {
     /// Time each pass of a GPU by itself, and what lies between them; frames then take longer
     #[arg(long)]
     pub(crate) passes: bool,
-    /// Print one JSON object on standard output: scene, device, counts, milliseconds per stage and pass
+    /// Print one JSON object on standard output: scene, device, counts, milliseconds per stage and pass, and what each
+    /// stage asks of a GPU
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]

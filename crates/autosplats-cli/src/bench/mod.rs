@@ -5,7 +5,7 @@ mod paper;
 
 use std::time::{Duration, Instant};
 
-use autosplats::{Counts, PassTime, Renderer, Settings, Timings};
+use autosplats::{Counts, PassTime, Renderer, Settings, StageWork, Timings};
 use autosplats_cloud::PointCloud;
 use autosplats_scenes::SCENE_PREFIX;
 use serde::Serialize;
@@ -68,6 +68,9 @@ struct Run {
     /// The frame's time that no pass took; only if each pass is timed.
     #[serde(skip_serializing_if = "Option::is_none")]
     between_passes_ms: Option<f64>,
+    /// What each stage asks of a GPU in a frame: dispatches, their longest chain, bytes bound.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    work: Option<Vec<StageWork>>,
     /// Clock of the device's processors while it rendered, where its driver tells.
     #[serde(skip_serializing_if = "Option::is_none")]
     clock: Option<Clock>,
@@ -182,6 +185,7 @@ fn measure(
         },
         passes: passes.collect(),
         between_passes_ms: (args.passes && renderer.adapter().is_some()).then(|| median(between)),
+        work: renderer.stage_work(),
         clock: clocks.and_then(ClockReader::finish),
         unconverged: renderer.convergence()?,
         device,

@@ -21,6 +21,5 @@ pub(crate) struct Pass {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) layout: wgpu::BindGroupLayout,
     /// Whether the pass may write each binding.
-    #[cfg(test)]
     pub(super) writes: Vec<bool>,
 }

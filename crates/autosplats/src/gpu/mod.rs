@@ -15,6 +15,7 @@ mod raster;
 mod recorder;
 mod source;
 mod step;
+mod work;
 
 pub(crate) use buffers::Readback;
 #[cfg(test)]
@@ -31,3 +32,5 @@ pub use recorder::PassTime;
 pub(crate) use recorder::{Clock, DISPATCH_BYTES, Recorder, stage_ms};
 pub(crate) use source::{PassSource, passes};
 pub(crate) use step::{Groups, Step};
+pub use work::StageWork;
+pub(crate) use work::stage_work;

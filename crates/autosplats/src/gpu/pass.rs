@@ -5,7 +5,7 @@ use std::sync::PoisonError;
 use super::Gpu;
 use super::compiled::{Pass, PassKey};
 use super::source::{LinkedSource, PassSource, PipelineParts, bind, compilation_options};
-use super::step::{Groups, Step, StepWork};
+use super::step::{Groups, Step, StepWork, Use};
 use crate::Error;
 
 impl Pass {
@@ -44,7 +44,6 @@ impl Pass {
                 label: label.clone(),
                 pipeline,
                 layout: made.layout,
-                #[cfg(test)]
                 writes: entries.iter().map(is_written).collect(),
             }
         })
@@ -72,24 +71,22 @@ impl Pass {
             path: self.path,
             label: self.label.clone(),
             work,
-            #[cfg(test)]
             uses: resources.iter().zip(&self.writes).filter_map(use_of).collect(),
         }
     }
 }
 
 /// Whether a pass may write a binding.
-#[cfg(test)]
 fn is_written(entry: &wgpu::BindGroupLayoutEntry) -> bool {
     let wgpu::BindingType::Buffer { ty, .. } = entry.ty else { return false };
     ty == wgpu::BufferBindingType::Storage { read_only: false }
 }
 
-/// The buffer of a binding, with whether it may be written.
-#[cfg(test)]
-fn use_of((resource, writes): (&wgpu::BindingResource<'_>, &bool)) -> Option<(wgpu::Buffer, bool)> {
+/// The use of a buffer that is bound; textures are none.
+fn use_of((resource, &writes): (&wgpu::BindingResource<'_>, &bool)) -> Option<Use> {
     let wgpu::BindingResource::Buffer(bound) = resource else { return None };
-    Some((bound.buffer.clone(), *writes))
+    let bytes = bound.size.map_or_else(|| bound.buffer.size() - bound.offset, u64::from);
+    Some(Use { buffer: bound.buffer.clone(), bytes, writes })
 }
 
 #[cfg(test)]

@@ -23,9 +23,18 @@ pub(crate) struct Step {
     pub(super) path: &'static str,
     pub(super) label: String,
     pub(super) work: StepWork,
-    /// Bound buffers, each with whether the pass may write it.
-    #[cfg(test)]
-    pub(crate) uses: Vec<(wgpu::Buffer, bool)>,
+    /// The buffers that a pass which computes binds.
+    pub(super) uses: Vec<Use>,
+}
+
+/// A buffer that a step binds.
+#[derive(Clone, Debug)]
+pub(super) struct Use {
+    pub(super) buffer: wgpu::Buffer,
+    /// Bytes of it that are bound.
+    pub(super) bytes: u64,
+    /// Whether the pass may write it. It may read it in any case.
+    pub(super) writes: bool,
 }
 
 /// The work of a step.
@@ -40,10 +49,7 @@ impl Step {
     pub(super) fn stage(&self) -> &'static str {
         self.path.split('/').next().unwrap_or(self.path)
     }
-}
 
-#[cfg(test)]
-impl Step {
     /// Number of workgroups of a step that computes.
     pub(crate) fn groups(&self) -> Option<&Groups> {
         match &self.work {
@@ -51,9 +57,7 @@ impl Step {
             StepWork::Raster(_) => None,
         }
     }
-}
 
-impl Step {
     /// Draws in this order, as one step with the name of the last draw.
     ///
     /// # Panics
@@ -64,7 +68,6 @@ impl Step {
             path: last.path,
             label: last.label.clone(),
             work: StepWork::Raster(Raster { targets, draws }),
-            #[cfg(test)]
             uses: Vec::new(),
         }
     }

@@ -3,7 +3,7 @@
 use super::gpu::GpuRenderer;
 use super::{BackendRenderer, Renderer};
 use crate::Error;
-use crate::gpu::{AdapterSummary, Gpu};
+use crate::gpu::{AdapterSummary, Gpu, StageWork};
 
 impl Renderer {
     /// Creates a renderer on the device that `which` names: by its index in [`adapters`](crate::adapters), or by its
@@ -77,6 +77,21 @@ impl Renderer {
     pub fn take_turns(&mut self, take: bool) {
         if let BackendRenderer::Gpu(renderer) = &mut self.form {
             renderer.take_turns(take);
+        }
+    }
+
+    /// What each stage of the last frame asks of a GPU: dispatches, their longest chain, bytes. `None` on the CPU, and
+    /// before the first frame.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// assert_eq!(autosplats::Renderer::new().stage_work(), None);
+    /// ```
+    pub fn stage_work(&self) -> Option<Vec<StageWork>> {
+        match &self.form {
+            BackendRenderer::Cpu(_) => None,
+            BackendRenderer::Gpu(renderer) => renderer.stage_work(),
         }
     }
 

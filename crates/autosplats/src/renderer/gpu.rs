@@ -23,7 +23,9 @@ use crate::cancel::NEVER;
 use crate::fit::Surfel;
 use crate::fit::orient::Sensors;
 use crate::fit::orient::gpu::{sensor_buffer, write_sensors};
-use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, stage_ms};
+use crate::gpu::{
+    AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, StageWork, stage_ms, stage_work,
+};
 use crate::points::Points;
 use crate::project::gpu::{Counter, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, SlotTable, Uploader};
@@ -120,6 +122,11 @@ impl GpuRenderer {
     /// See [`Renderer::take_turns`](super::Renderer::take_turns).
     pub(super) fn take_turns(&mut self, take: bool) {
         self.takes_turns = take;
+    }
+
+    /// See [`Renderer::stage_work`](super::Renderer::stage_work).
+    pub(super) fn stage_work(&self) -> Option<Vec<StageWork>> {
+        self.prepared.as_ref().map(|prepared| stage_work(&prepared.steps))
     }
 
     /// Checks that the device can run the engine.

@@ -1,11 +1,9 @@
 //! How many commands a frame is made of.
 
-use std::collections::HashMap;
-
 use autosplats_scenes::Scene;
 
 use crate::camera::{Camera, Projection, ViewDirection, guess_axes};
-use crate::gpu::{Clock, Groups, Recorder, Step, test_gpu};
+use crate::gpu::{Clock, Groups, Recorder, StageWork, Step, test_gpu};
 use crate::points::Points;
 use crate::renderer::gpu::GpuRenderer;
 use crate::renderer::texture::Destination;
@@ -24,10 +22,19 @@ struct Commands {
     /// Length of the longest chain of dispatches in which each needs the one before it to be done. The device can run
     /// dispatches beside each other only where this is below their number.
     chain: usize,
+    /// Bytes bound, as [`StageWork::bytes`] says.
+    bytes: u64,
 }
 
 impl Commands {
     fn of(renderer: &GpuRenderer) -> Self {
+        let work = renderer.stage_work().expect("a frame was rendered");
+        let stages: Vec<_> = work.iter().map(|work| work.stage).collect();
+        assert!(
+            ["project", "search", "fit", "splat", "shade"].iter().all(|stage| stages.contains(stage)),
+            "{stages:?}"
+        );
+        let sum = |count: fn(&StageWork) -> usize| work.iter().map(count).sum();
         let steps = &renderer.prepared.as_ref().expect("a frame was rendered").steps;
         let mut recorder = Recorder::new(&renderer.gpu, &Clock::Off);
         steps.iter().for_each(|step| recorder.run(step));
@@ -36,40 +43,14 @@ impl Commands {
         let groups: Vec<&Groups> = steps.iter().filter_map(Step::groups).collect();
         assert_eq!(groups.len(), steps.len(), "no step draws");
         Self {
-            dispatches: steps.len(),
+            dispatches: sum(|work| work.dispatches),
             single: groups.iter().filter(|groups| matches!(groups, Groups::Number(1))).count(),
             indirect: groups.iter().filter(|groups| matches!(groups, Groups::Counted(..))).count(),
             passes,
-            chain: longest_chain(steps),
+            chain: sum(|work| work.chain),
+            bytes: work.iter().map(|work| work.bytes).sum(),
         }
     }
-}
-
-/// Two dispatches depend on each other if they share a buffer that one of them writes.
-#[allow(clippy::mutable_key_type, reason = "buffers are compared by what they are, not by what they hold")]
-fn longest_chain(steps: &[Step]) -> usize {
-    // For each buffer, the lengths of the chains that end with its last write, and with the longest read since.
-    let mut ends: HashMap<wgpu::Buffer, [usize; 2]> = HashMap::new();
-    let mut longest = 0;
-    for step in steps {
-        let counted = step.groups().and_then(|groups| match groups {
-            Groups::Counted(arguments, _) => Some((arguments.clone(), false)),
-            Groups::Number(_) => None,
-        });
-        let uses: Vec<_> = step.uses.iter().cloned().chain(counted).collect();
-        let before = |(buffer, writes): &(wgpu::Buffer, bool)| {
-            let [written, read] = ends.get(buffer).copied().unwrap_or_default();
-            if *writes { written.max(read) } else { written }
-        };
-        let length = 1 + uses.iter().map(before).max().unwrap_or(0);
-        longest = longest.max(length);
-        for (buffer, writes) in uses {
-            let end = ends.entry(buffer).or_default();
-            let place = usize::from(!writes);
-            end[place] = end[place].max(length);
-        }
-    }
-    longest
 }
 
 #[test]
@@ -90,6 +71,9 @@ fn dispatches_of_a_frame() {
     let of_the_paper =
         commands(Reconstruction { adaptive: false, points_per_pixel: 1, trim: false, ..Reconstruction::default() });
     // Hardware has seven dispatches less, as it fills several levels of cells by one, and two more for long searches.
-    assert_eq!(usual, Commands { dispatches: 53, single: 8, indirect: 29, passes: 1, chain: 49 });
-    assert_eq!(of_the_paper, Commands { dispatches: 30, single: 0, indirect: 20, passes: 1, chain: 28 });
+    assert_eq!(usual, Commands { dispatches: 53, single: 8, indirect: 29, passes: 1, chain: 49, bytes: 54_010_336 });
+    assert_eq!(
+        of_the_paper,
+        Commands { dispatches: 30, single: 0, indirect: 20, passes: 1, chain: 28, bytes: 39_084_572 }
+    );
 }
