@@ -1,39 +1,34 @@
-// Lists the owners of slots in cell order, empties their slots, and stores the start of each cell.
+// Lists the owners of slots in cell order, and stores the start of each cell.
 //
-// Reads: counters, block_sums, names, sixteenths. Reads and writes: keys. Writes: source, pixels, cell_start.
+// Reads: keys, counters, block_sums, names. Writes: source, pixels, cell_start.
 
 #import frame
 #import cell_order
 #import groups
-#import held
 #import keys
 #import names
 #import rank
 #import sum_before
 
-@group(0) @binding(1) var<storage, read_write> keys: array<Key>;
+@group(0) @binding(1) var<storage, read> keys: array<Key>;
 @group(0) @binding(2) var<storage, read> counters: array<u32>;
 @group(0) @binding(3) var<storage, read> block_sums: array<u32>;
 @group(0) @binding(4) var<storage, read_write> source: array<u32>;
 @group(0) @binding(5) var<storage, read_write> pixels: array<u32>;
 @group(0) @binding(6) var<storage, read_write> cell_start: array<u32>;
 @group(0) @binding(7) var<storage, read> names: array<u32>;
-@group(0) @binding(8) var<storage, read> sixteenths: array<u32>;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     rank_clear(local);
     let block = group_index(workgroup);
     let strip_px = counters[STRIP_PX];
-    var owned_steps = 0u;
     for (var step = 0u; step < RANK_BLOCK_FLAGS / LARGE_GROUP; step++) {
         let flag = step * LARGE_GROUP + local;
         let at = block * RANK_BLOCK_FLAGS + flag;
         if at < arrayLength(&keys) {
-            let place = cell_slot(at, strip_px);
-            if is_held(place.pixel, place.half) && is_owned(keys[place.slot]) {
+            if keys[cell_slot(at, strip_px).slot].ordinal != NO_POINT {
                 rank_set(flag);
-                owned_steps |= 1u << step;
             }
         }
     }
@@ -48,9 +43,9 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
             if place.first {
                 cell_start[place.cell] = index;
             }
-            if (owned_steps & (1u << step)) != 0u {
-                source[index] = index_of(~keys[place.slot].ordinal);
-                keys[place.slot] = EMPTY_KEY;
+            let key = keys[place.slot];
+            if key.ordinal != NO_POINT {
+                source[index] = index_of(key.ordinal);
                 pixels[index] = (place.pixel.y << 16u) | place.pixel.x;
             }
         }

@@ -17,7 +17,6 @@ const LIBRARY: Library = Library {
         "cell_sizes",
         "count_dropped",
         "count_near",
-        "held",
         "keys",
         "list_near",
         "near_cells",
@@ -31,7 +30,7 @@ const LIBRARY: Library = Library {
             FACE_CELLS, FIRST_OCTAVE, LISTED_OCTAVES, MOST_NEAR, NEAR_CELLS, NEAR_POINTS, NEAR_REACH, OCTAVES,
             SPARSE_POINTS
         ),
-        constants![ENTRY_WORDS, INDEX_WORD, MARGIN_REACH, POINTS_PER_LANE, RANK_BLOCK_FLAGS],
+        constants![ENTRY_WORDS, MARGIN_REACH, POINTS_PER_LANE, RANK_BLOCK_FLAGS],
     ],
 };
 
@@ -124,10 +123,8 @@ pub(crate) fn drawing_constant(gpu: &Gpu) -> (&'static str, f64) {
 
 /// Points that an invocation of `project_lanes` takes, one after the other.
 const POINTS_PER_LANE: u32 = 4;
-/// Words of an entry of a cell around the eye: ordinal, position and index of a point.
-const ENTRY_WORDS: usize = 5;
-/// The word of the index in an entry.
-const INDEX_WORD: usize = 4;
+/// Words of an entry of a cell around the eye: ordinal and position of a point.
+const ENTRY_WORDS: usize = 4;
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = crate::gpu::LARGE_GROUP;
 /// Flags that one workgroup ranks: a block.
@@ -199,7 +196,6 @@ pub(crate) struct ScreenBuffers {
     pub(crate) capacity: u32,
     /// One `u32` per [`Counter`].
     pub(crate) counters: wgpu::Buffer,
-    /// Keys of the owners of slots, which are empty between frames: `imports/keys.wgsl`.
     keys: wgpu::Buffer,
     /// Number of points of each cell around the eye, then entries for each.
     near: wgpu::Buffer,
@@ -442,18 +438,18 @@ impl ProjectPasses {
         let [width, height] = screen.size;
         let slots = (width * height) << u32::from(screen.halves);
         let slot_blocks = slots.div_ceil(RANK_BLOCK_FLAGS);
-        let cleared = (width * height).max(near::NEAR_CELLS as u32);
-        let clear = [frame, density, counters, sixteenths, near, depth, centers];
+        let cleared = slots.max(near::NEAR_CELLS as u32);
+        let clear = [frame, keys, density, counters, sixteenths, near, depth, centers];
         let mut steps = vec![self.clear.step(gpu, &clear, cleared.div_ceil(GROUP))];
         steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
         const BLOCK_PX: u32 = cpu::OCCUPANCY_BLOCK_PX as u32;
         let covered_blocks = width.div_ceil(BLOCK_PX) * height.div_ceil(BLOCK_PX);
-        steps.push(self.occupancy.step(gpu, &[frame, keys, counters, sixteenths], covered_blocks));
+        steps.push(self.occupancy.step(gpu, &[frame, keys, counters], covered_blocks));
         // Blocks beyond the slots, which only hold points of sparse cells, count none.
         let blocks = slots.max(screen.capacity).div_ceil(RANK_BLOCK_FLAGS);
-        let count = [frame, keys, counters, block_sums, density, near, source, sixteenths, &arguments[0]];
+        let count = [frame, keys, counters, block_sums, density, near, source, names, &arguments[0]];
         steps.push(self.count.step(gpu, &count, 1 + blocks));
-        let compact = [frame, keys, counters, block_sums, source, pixels, cell_start, names, sixteenths];
+        let compact = [frame, keys, counters, block_sums, source, pixels, cell_start, names];
         steps.push(self.compact.step(gpu, &compact, slot_blocks));
         for chunk in cloud.chunks() {
             let Chunk { uniform, positions, values: stored, .. } = chunk;

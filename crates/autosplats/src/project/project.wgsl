@@ -1,4 +1,4 @@
-// Every point goes to its pixel, or half pixel, and the nearest wins [Paper, §3], by a 64-bit atomic maximum.
+// Every point goes to its pixel, or half pixel, and the nearest wins [Paper, §3], by a 64-bit atomic minimum.
 //
 // Reads: a chunk of the cloud. Writes: keys, counters, sixteenths, near. `project_32` does the same with 32 bits.
 
@@ -23,12 +23,12 @@ fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     let index = group_index(workgroup) * LARGE_GROUP + local;
     if is_drawn(index) {
         let projected = project_point(from_eye(index));
-        count_near(projected, index);
+        count_near(projected, ordinal_of(index));
         if projected.slot >= SLOT_OUTSIDE {
             count_dropped(projected.slot);
         } else {
-            let key = (u64(~bitcast<u32>(projected.depth)) << 32u) | u64(~ordinal_of(index));
-            atomicMax(&keys[projected.slot], key);
+            let key = (u64(bitcast<u32>(projected.depth)) << 32u) | u64(ordinal_of(index));
+            atomicMin(&keys[projected.slot], key);
             add_sixteenth(projected.sixteenths);
         }
     }

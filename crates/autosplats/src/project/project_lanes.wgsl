@@ -1,5 +1,5 @@
 // Like `project`, for devices whose 64-bit atomics can load and whose invocations run in subgroups. Most points lose:
-// they lie behind the nearest point that is known, or beside a nearer one. Such points ask for no atomic maximum.
+// they lie behind the nearest point that is known, or beside a nearer one. Such points ask for no atomic minimum.
 //
 // Reads: a chunk of the cloud. Writes: keys, counters, sixteenths, near.
 
@@ -46,7 +46,7 @@ fn project_lanes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocat
         if is_drawn(index) {
             let projected = project_point(from_eye(index));
             ordinal = ordinal_of(index);
-            count_near(projected, index);
+            count_near(projected, ordinal);
             if projected.slot >= SLOT_OUTSIDE {
                 count_dropped(projected.slot);
             } else {
@@ -56,9 +56,9 @@ fn project_lanes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocat
             }
         }
         if !loses(slot, depth, ordinal) && slot != SLOT_NONE {
-            let key = (u64(~depth) << 32u) | u64(~ordinal);
-            if key > atomicLoad(&keys[slot]) {
-                atomicMax(&keys[slot], key);
+            let key = (u64(depth) << 32u) | u64(ordinal);
+            if key < atomicLoad(&keys[slot]) {
+                atomicMin(&keys[slot], key);
             }
         }
     }

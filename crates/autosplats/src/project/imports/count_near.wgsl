@@ -1,13 +1,11 @@
-// Counts a point in the cells around the eye, and keeps it while the cell is sparse. The including pass binds `near` as
-// atomics, and `chunk`.
+// Counts a point in the cells around the eye, and keeps its ordinal while the cell is sparse. The including pass binds
+// `near` as atomics.
 
-#import cloud_points
 #import frame
 #import near_cells
 #import project_point
 
-// Counts the point at a place in the chunk.
-fn count_near(projected: Projected, at_point: u32) {
+fn count_near(projected: Projected, ordinal: u32) {
     if frame.near_cells == 0u || projected.slot == SLOT_NOT_FINITE {
         return;
     }
@@ -18,11 +16,10 @@ fn count_near(projected: Projected, at_point: u32) {
         if at < SPARSE_POINTS {
             let entry = near_entries(cell) + at * ENTRY_WORDS;
             let bits = bitcast<vec3u>(projected.position_view);
-            atomicStore(&near[entry], ordinal_of(at_point));
+            atomicStore(&near[entry], ordinal);
             atomicStore(&near[entry + 1u], bits.x);
             atomicStore(&near[entry + 2u], bits.y);
             atomicStore(&near[entry + 3u], bits.z);
-            atomicStore(&near[entry + INDEX_WORD], chunk.first + at_point);
         }
     }
 }

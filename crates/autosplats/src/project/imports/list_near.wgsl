@@ -1,8 +1,9 @@
 // Lists the points of the sparse cells around the eye after the screen points, if any is near: see `near.rs`. Each
-// invocation takes a run of cells. The including pass binds `near` for reading, and `counters`, `source` and
-// `arguments`.
+// invocation takes a run of cells. The including pass binds `near` and `names` for reading, and `counters`, `source`
+// and `arguments`.
 
 #import frame
+#import names
 #import near_cells
 #import near_points
 #import put_work
@@ -23,7 +24,7 @@ fn listed_len(cell: u32) -> u32 {
 
 // Whether an entry comes before another: by the bits of positions, then by ordinal.
 fn is_before(a: u32, b: u32) -> bool {
-    for (var word = 1u; word < INDEX_WORD; word++) {
+    for (var word = 1u; word < ENTRY_WORDS; word++) {
         if near[a + word] != near[b + word] {
             return near[a + word] < near[b + word];
         }
@@ -91,7 +92,7 @@ fn list_near(local: u32) {
             for (var other = 0u; other < len; other++) {
                 rank += u32(is_before(first_entry + other * ENTRY_WORDS, own_entry));
             }
-            source[place + rank] = near[own_entry + INDEX_WORD];
+            source[place + rank] = index_of(near[own_entry]);
         }
         place += len;
     }

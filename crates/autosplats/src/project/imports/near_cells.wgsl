@@ -1,6 +1,5 @@
 // Cells around the eye, by direction and octave of distance: see `near.rs`. The including pass binds `near`: the number
-// of points of each cell, then SPARSE_POINTS entries for each cell: ordinal, bits of the position, and index of a
-// point.
+// of points of each cell, then SPARSE_POINTS entries for each cell: index and bits of the position of a point.
 
 #import frame
 
