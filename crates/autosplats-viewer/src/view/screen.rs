@@ -65,14 +65,15 @@ impl CallbackTrait for OnScreen {
 }
 
 impl OnScreen {
-    fn new_texture(&self, device: &wgpu::Device, image: &Image) -> wgpu::Texture {
+    /// A texture for a picture in memory, in a window of this format.
+    pub(crate) fn new_texture(device: &wgpu::Device, format: wgpu::TextureFormat, image: &Image) -> wgpu::Texture {
         device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),
             size: wgpu::Extent3d { width: image.width, height: image.height, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: WindowDevice::texture_format(self.format),
+            format: WindowDevice::texture_format(format),
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         })
@@ -81,7 +82,7 @@ impl OnScreen {
     fn new_screen(&self, device: &wgpu::Device, pipeline: wgpu::RenderPipeline) -> Screen {
         let (texture, supersample) = match &self.pixels {
             Pixels::Texture { texture, supersample } => (wgpu::Texture::clone(texture), *supersample),
-            Pixels::Image(image) => (self.new_texture(device, image), 1),
+            Pixels::Image(image) => (Self::new_texture(device, self.format, image), 1),
         };
         let filter = if self.sharp { wgpu::FilterMode::Nearest } else { wgpu::FilterMode::Linear };
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
@@ -110,6 +111,7 @@ impl OnScreen {
         Screen { pipeline, texture, bindings, pixels: self.pixels.clone(), sharp: self.sharp }
     }
 }
+
 impl Screen {
     /// Whether the texture is this object's own and takes the picture.
     fn has_room_for(&self, next: &OnScreen) -> bool {

@@ -56,9 +56,11 @@ fn averaged(place: vec2f) -> vec4f {
 
 @fragment
 fn pixel(corner: Corner) -> @location(0) vec4f {
-    var color = textureSample(picture, picture_sampler, corner.place);
+    var color: vec4f;
     if reading.supersample > 1u {
         color = averaged(corner.place);
+    } else {
+        color = textureSample(picture, picture_sampler, corner.place);
     }
     return vec4f(mix(GROUND, color.rgb, color.a), 1.0);
 }

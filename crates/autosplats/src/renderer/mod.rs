@@ -151,7 +151,7 @@ enum BackendRenderer {
 /// A picture and its statistics.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
-    /// The picture.
+    /// The picture; empty if it was rendered into a [texture](Renderer::render_to_texture_while).
     pub image: &'a Image,
     /// The visible surface that the picture shows. On a GPU, empty unless [all layers](Settings::all_layers) are
     /// requested.
@@ -197,7 +197,7 @@ impl Renderer {
     /// Creates a renderer on the caller's device, best made by [`device_descriptor`](crate::device_descriptor). No
     /// feature is required, except that [`SplatCommunicationRaster`](crate::SearchEngine::SplatCommunicationRaster)
     /// needs `FLOAT32_BLENDABLE`. Without timestamps, passes are not timed, and the time of a frame includes reading it
-    /// back.
+    /// back. With `PIPELINE_CACHE`, pipelines are kept in the user's cache folder for the next start.
     ///
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has; [`Error::DeviceMemory`].

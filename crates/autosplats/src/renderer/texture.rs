@@ -99,24 +99,6 @@ impl Renderer {
     ///
     /// # Errors
     /// Those of [`render_to_texture`](Self::render_to_texture), and [`Error::Cancelled`] if `go_on` returned false.
-    ///
-    /// # Examples
-    ///
-    /// ```no_run
-    /// use autosplats::{Error, Renderer, Settings, wgpu};
-    /// # use autosplats::{Camera, cloud::PointCloud};
-    ///
-    /// /// Draws, and returns how long the device took, in milliseconds.
-    /// fn draw(
-    ///     renderer: &mut Renderer,
-    ///     cloud: &PointCloud,
-    ///     camera: &Camera,
-    ///     texture: &wgpu::Texture,
-    /// ) -> Result<f64, Error> {
-    ///     let frame = renderer.render_to_texture_while(cloud, camera, texture, &Settings::default(), &|| true)?;
-    ///     Ok(frame.timings.frame)
-    /// }
-    /// ```
     pub fn render_to_texture_while<'a>(
         &mut self,
         points: impl Into<Points<'a>>,

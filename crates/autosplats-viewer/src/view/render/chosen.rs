@@ -27,9 +27,14 @@ impl Chosen {
         Ok(Self { backend, renderer, textures })
     }
 
+    /// Whether the device is that of the window.
+    pub(super) fn is_of_window(&self) -> bool {
+        self.textures.is_some()
+    }
+
     /// The renderer. A window on the same device is drawn while a picture is in work.
     pub(super) fn renderer(&mut self) -> &mut Renderer {
-        self.renderer.take_turns(self.textures.is_some());
+        self.renderer.take_turns(self.is_of_window());
         &mut self.renderer
     }
 

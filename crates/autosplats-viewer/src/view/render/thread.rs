@@ -65,8 +65,8 @@ pub(super) fn run(shared: &Shared, trees: &TreeHandle, outbox: &Outbox) {
             Ok(Some(answer)) => outbox.send(answer),
             Err(error) => {
                 if matches!(error, Error::DeviceLost(_)) {
-                    studio.renderer = None;
-                    studio.is_window_lost = true;
+                    let lost = studio.renderer.take();
+                    studio.is_window_lost |= lost.is_some_and(|chosen| chosen.is_of_window());
                 }
                 outbox.send(Answer::Failed(error.to_string()));
             }
