@@ -153,6 +153,8 @@ fn moving_pictures_stay_there_too() {
     let Some(device) = window_device(wgpu::TextureFormat::Rgba8Unorm) else { return };
     let mut window = Window::sharing(device, &[STATUE]);
     window.settle();
+    let place = window.place(0.5, 0.42);
+    window.event(Event::PointerMoved(place));
     for _ in 0..8 {
         let before = window.app().view.shot.as_ref().expect("there is a picture").camera;
         window.wheel(1, 2.0);
