@@ -47,8 +47,7 @@ Written by `cargo xtask card`. Changes here are lost.
         [
             "Predicted, not measured",
             "Milliseconds on an H200. *56e866a* was measured. *step-1* is one compute pass, fewer dispatches and parallel \
-             uploads, 15 % more or less. *step-2* is long work by many lanes, 30 % more or less. Of it, lists of balls \
-             in *adapt* are not built.",
+             uploads, 15 % more or less. *step-2* is long work by many lanes, 30 % more or less.",
             "scene settings stage",
             "56e866a step-1 step-2",
         ],

@@ -23,7 +23,7 @@
 @group(0) @binding(6) var<storage, read_write> sheets: array<Sheet>;
 
 // Cells of a workgroup.
-override ITEMS_PER_GROUP: u32;
+override CELLS_PER_GROUP: u32;
 
 struct SheetDemand {
     // Mean k-radius, pixels; 0 if no surfel asks.
@@ -57,12 +57,12 @@ var<workgroup> shared_wanted: u32;
 fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     own_place = local;
     let level = levels[statistics.sheet_level];
-    let first = group_index(workgroup) * ITEMS_PER_GROUP;
+    let first = group_index(workgroup) * CELLS_PER_GROUP;
     if local == 0u {
         atomicStore(&found_wanted, 0u);
     }
     workgroupBarrier();
-    for (var index = local; index < ITEMS_PER_GROUP; index += TOGETHER) {
+    for (var index = local; index < CELLS_PER_GROUP; index += TOGETHER) {
         let cell = first + index;
         if cell < level.columns * level.rows && sheets[cell * SHEETS].radius == UNKNOWN && asked_around(level, cell).k_radius_px > 0.0 {
             atomicOr(&found_wanted, 1u << index);

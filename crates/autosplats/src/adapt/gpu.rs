@@ -8,18 +8,20 @@ use super::{self as adapt, SCALES, cells, depth, noise, quadric, rows, rules, sh
 use crate::Error;
 use crate::fit::{self, Surfel};
 use crate::gpu::{DISPATCH_BYTES, Gpu, Groups, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
-use crate::project::gpu::{Counter, Round, ScreenBuffers, few_constant};
+use crate::project::gpu::{Counter, Round, ScreenBuffers};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
     files: &[files![
-        "alone",
+        "adapted",
+        "balls",
         "base_radius",
         "calls",
         "choose",
         "clusters",
         "depth_noise",
         "filling",
+        "later",
         "layout",
         "levels",
         "merging",
@@ -28,7 +30,7 @@ const LIBRARY: Library = Library {
         "rows",
         "scatters",
         "sheet",
-        "shrink",
+        "surface",
         "through",
         "together",
     ]],
@@ -86,11 +88,17 @@ passes! {
     ASK = "ask",
     FIT_SHEETS = "fit_sheets",
     ADAPT = "adapt",
-    TURN_ROWS = "turn_rows",
+    FIT_BALLS = "fit_balls",
 }
 
 /// Invocations that sum up a ball together, on hardware and on a software device, which runs eight side by side.
 const TOGETHER: [u32; 2] = [32, 8];
+/// Cells with sheets of a workgroup, at most 32, on hardware and on a software device. Small groups keep a GPU evenly
+/// busy. A software device pays more for a workgroup than for most cells.
+const CELLS_PER_GROUP: [u32; 2] = [4, 16];
+/// Surfels whose balls a workgroup fits one after the other, as far as there are workgroups for all. Software ends all
+/// loops of an invocation after 65535 rounds in sum, so it takes not too many.
+const SURFELS_PER_GROUP: [u32; 2] = [1, 16];
 /// Clusters of a cell that are stored side by side.
 const BUNCH: usize = 4;
 /// Parts of the sample that have quantiles: its densest third, its sparsest third, all, and all by steady shares.
@@ -128,7 +136,7 @@ pub(crate) struct Asked {
 #[derive(Debug)]
 pub(crate) struct AdaptBuffers {
     levels: wgpu::Buffer,
-    /// Workgroups that fit sheets, three `u32`.
+    /// Workgroups that fit sheets, and those that fit the balls of each round, three `u32` each.
     arguments: wgpu::Buffer,
     /// Most tiles of each level.
     tiles: [u32; MOST_LEVELS],
@@ -157,10 +165,14 @@ impl AdaptBuffers {
         let most_finest = most_finest(gpu.most_bound());
         let sheet_cells = most_sheet_cells(size, most_finest);
         Ok(Self {
-            levels: gpu.storage::<Level>("levels of cells", MOST_LEVELS)?,
+            levels: gpu.buffer(
+                "levels of cells",
+                size_of::<[Level; MOST_LEVELS]>() as u64,
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_SRC,
+            )?,
             arguments: gpu.buffer(
-                "arguments of sheets",
-                DISPATCH_BYTES,
+                "arguments of sheets and balls",
+                3 * DISPATCH_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
             tiles: std::array::from_fn(|level| most_tiles(size, most_finest, level)),
@@ -260,7 +272,7 @@ pub(crate) struct AdaptPasses {
     /// One pass per round, as the next two.
     ask: [Pass; 2],
     adapt: [Pass; 2],
-    turn_rows: [Pass; 2],
+    fit_balls: [Pass; 2],
 }
 
 impl AdaptPasses {
@@ -283,11 +295,12 @@ impl AdaptPasses {
             Ok::<_, Error>((level, told))
         };
         let step = COARSER[kind] + 1;
-        let few = few_constant(gpu);
+        let cells = ("CELLS_PER_GROUP", CELLS_PER_GROUP[kind].into());
+        let surfels = ("SURFELS_PER_GROUP", SURFELS_PER_GROUP[kind].into());
         let pass = |source| Pass::new(gpu, source, &[]);
         let ask = |round: Round| Pass::new(gpu, &ASK, &[round.constant()]);
-        let adapt = |round: Round| Pass::new(gpu, &ADAPT, &[round.constant()]);
-        let turn_rows = |round: Round| Pass::new(gpu, &TURN_ROWS, &[round.constant(), together, few]);
+        let adapt = |round: Round| Pass::new(gpu, &ADAPT, &[round.constant(), surfels]);
+        let fit_balls = |round: Round| Pass::new(gpu, &FIT_BALLS, &[round.constant(), together]);
         let most_finest = ("MOST_FINEST", most_finest(gpu.most_bound()) as f64);
         Ok(Self {
             fill: Pass::new(gpu, &FILL, &[most_finest, coarser])?,
@@ -297,11 +310,11 @@ impl AdaptPasses {
             sample: pass(&SAMPLE_PASS)?,
             scatter: Pass::new(gpu, &SCATTERS, &[together])?,
             quantile: pass(&QUANTILES)?,
-            noise: Pass::new(gpu, &NOISE, &[few])?,
-            fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[together, few])?,
+            noise: Pass::new(gpu, &NOISE, &[cells])?,
+            fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[together, cells])?,
             ask: [ask(Round::Active)?, ask(Round::Recovered)?],
             adapt: [adapt(Round::Active)?, adapt(Round::Recovered)?],
-            turn_rows: [turn_rows(Round::Active)?, turn_rows(Round::Recovered)?],
+            fit_balls: [fit_balls(Round::Active)?, fit_balls(Round::Recovered)?],
         })
     }
 
@@ -333,7 +346,7 @@ impl AdaptPasses {
         buffers: &AdaptBuffers,
         round: Round,
     ) -> Vec<Step> {
-        let ScreenBuffers { counters, density, .. } = screen;
+        let ScreenBuffers { counters, density, left, .. } = screen;
         let AdaptBuffers { levels, arguments, clusters, asked, sheets, .. } = buffers;
         let AdaptBuffers { picked, sampled, scatters, quantiles, statistics, depth_noise, .. } = buffers;
         let mut steps = Vec::new();
@@ -350,14 +363,15 @@ impl AdaptPasses {
         }
         let ask = [frame, counters, levels, statistics, surfels, depth_noise, asked];
         let fit = [frame, levels, clusters, statistics, asked, depth_noise, sheets];
-        let adapt = [frame, counters, density, levels, clusters, statistics, sheets, depth_noise, surfels];
-        let turn_rows = [frame, counters, density, levels, clusters, statistics, depth_noise, surfels];
+        let adapt = [frame, counters, density, levels, statistics, sheets, depth_noise, surfels, left, arguments];
+        let balls = [frame, counters, density, levels, clusters, statistics, sheets, depth_noise, surfels, left];
         let round_at = round as usize;
+        let balls_at = (1 + round as u64) * DISPATCH_BYTES;
         steps.extend([
             self.ask[round_at].step(gpu, &ask, screen.groups(round.work_64())),
             self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), 0)),
             self.adapt[round_at].step(gpu, &adapt, screen.groups(round.work_64())),
-            self.turn_rows[round_at].step(gpu, &turn_rows, screen.groups(round.work_few())),
+            self.fit_balls[round_at].step(gpu, &balls, Groups::Counted(arguments.clone(), balls_at)),
         ]);
         steps
     }

@@ -1,5 +1,5 @@
 // The noise level: how far points scatter about the surface. See the CPU form. Counts the workgroups that fit sheets:
-// none where nothing is noisy. One invocation.
+// none where nothing is noisy. Those that fit balls are counted by `adapt`. One invocation.
 //
 // Reads: surfels, sampled, quantiles, levels, depth_noise. Writes: statistics, arguments.
 
@@ -20,7 +20,7 @@
 @group(0) @binding(7) var<storage, read_write> arguments: array<Dispatch>;
 
 // Cells of a workgroup that fits sheets.
-override ITEMS_PER_GROUP: u32;
+override CELLS_PER_GROUP: u32;
 
 // Noise level of a part of the sample with about the same density; 0 if the part is too small.
 fn scatter_level(part: u32) -> f32 {
@@ -116,5 +116,7 @@ fn noise() {
     let level = levels[sheet_level];
     // Without a level no surfel asks for sheets.
     let is_noisy = (found.level > 0.0 || any_known()) && level.side_px > 0u;
-    put_work(0u, select(0u, level.columns * level.rows, is_noisy), ITEMS_PER_GROUP);
+    put_work(0u, select(0u, level.columns * level.rows, is_noisy), CELLS_PER_GROUP);
+    arguments[1] = Dispatch(0u, 1u, 1u);
+    arguments[2] = Dispatch(0u, 1u, 1u);
 }

@@ -1,28 +1,23 @@
-// Empties for a new frame what its passes add to: keys, density cells, counters, sixteenths, the cells around the eye,
-// the depth map and the centres of splats.
+// Empties for a new frame what its passes add to: density cells, counters, sixteenths, the cells around the eye, the
+// depth map and the centres of splats. Keys are empty: see `keys`.
 //
-// Writes: keys, density, counters, sixteenths, near, depth_map, centers.
+// Writes: density, counters, sixteenths, near, depth_map, centers.
 
 #import frame
 #import density
 #import depth_map
 #import groups
-#import keys
 
-@group(0) @binding(1) var<storage, read_write> keys: array<Key>;
-@group(0) @binding(2) var<storage, read_write> density: array<DensityCell>;
-@group(0) @binding(3) var<storage, read_write> counters: array<u32>;
-@group(0) @binding(4) var<storage, read_write> sixteenths: array<u32>;
-@group(0) @binding(5) var<storage, read_write> near: array<u32>;
-@group(0) @binding(6) var<storage, read_write> depth_map: array<u32>;
-@group(0) @binding(7) var<storage, read_write> centers: array<u32>;
+@group(0) @binding(1) var<storage, read_write> density: array<DensityCell>;
+@group(0) @binding(2) var<storage, read_write> counters: array<u32>;
+@group(0) @binding(3) var<storage, read_write> sixteenths: array<u32>;
+@group(0) @binding(4) var<storage, read_write> near: array<u32>;
+@group(0) @binding(5) var<storage, read_write> depth_map: array<u32>;
+@group(0) @binding(6) var<storage, read_write> centers: array<u32>;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn clear(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let index = group_index(workgroup) * LARGE_GROUP + local;
-    if index < arrayLength(&keys) {
-        keys[index] = EMPTY_KEY;
-    }
     if index < arrayLength(&density) {
         density[index] = DensityCell(0u, infinity());
     }

@@ -1,13 +1,14 @@
 // Counts the screen points of each block of slots in cell order. Counts the screen points of each density cell
 // and finds its nearest depth [Paper, §5.1]. The first workgroup lists the points of sparse cells around the eye.
 //
-// Reads: keys, near, names. Reads and writes: counters. Writes: block_sums, density, source, arguments.
+// Reads: keys, sixteenths, near. Reads and writes: counters. Writes: block_sums, density, source, arguments.
 
 #import frame
 #import cell_order
 #import cell_sizes
 #import density
 #import groups
+#import held
 #import keys
 #import list_near
 
@@ -17,7 +18,7 @@
 @group(0) @binding(4) var<storage, read_write> density: array<CountedCell>;
 @group(0) @binding(5) var<storage, read> near: array<u32>;
 @group(0) @binding(6) var<storage, read_write> source: array<u32>;
-@group(0) @binding(7) var<storage, read> names: array<u32>;
+@group(0) @binding(7) var<storage, read> sixteenths: array<u32>;
 @group(0) @binding(8) var<storage, read_write> arguments: array<Dispatch>;
 
 // A density cell with atomics. Depths, which are positive, have the order of their bits.
@@ -55,12 +56,14 @@ fn count_block(block: u32, sizes: CellSizes, local: u32) {
         let at = block * RANK_BLOCK_FLAGS + step * LARGE_GROUP + local;
         if at < arrayLength(&keys) {
             let place = cell_slot(at, sizes.strip_px);
-            let key = keys[place.slot];
-            if key.ordinal != NO_POINT {
-                own += 1u;
-                let cell = density_cell(place.pixel, sizes.cell_px, sizes.cell_columns);
-                atomicAdd(&density[cell].count, 1u);
-                atomicMin(&density[cell].nearest, key.depth);
+            if is_held(place.pixel, place.half) {
+                let key = keys[place.slot];
+                if is_owned(key) {
+                    own += 1u;
+                    let cell = density_cell(place.pixel, sizes.cell_px, sizes.cell_columns);
+                    atomicAdd(&density[cell].count, 1u);
+                    atomicMin(&density[cell].nearest, depth_of(key));
+                }
             }
         }
     }

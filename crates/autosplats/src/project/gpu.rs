@@ -17,6 +17,7 @@ const LIBRARY: Library = Library {
         "cell_sizes",
         "count_dropped",
         "count_near",
+        "held",
         "keys",
         "list_near",
         "near_cells",
@@ -67,8 +68,6 @@ indices! {
         QueriesDrawn,
         LeftActive64,
         LeftRecovered64,
-        ActiveFew,
-        RecoveredFew,
     }
 }
 
@@ -76,11 +75,6 @@ impl Round {
     /// The constant by which passes know the round.
     pub(crate) fn constant(self) -> (&'static str, f64) {
         ("ROUND", f64::from(self as u32))
-    }
-
-    /// Dispatch with [`few`] queries per workgroup.
-    pub(crate) fn work_few(self) -> Work {
-        [Work::ActiveFew, Work::RecoveredFew][self as usize]
     }
 
     /// Dispatch with 64 queries per workgroup.
@@ -102,17 +96,6 @@ impl Round {
     pub(crate) fn work_256(self) -> Work {
         [Work::Active256, Work::Recovered256][self as usize]
     }
-}
-
-/// Items, such as queries, that a workgroup processes together, one after the other; at most 32. Small groups keep a
-/// GPU evenly busy. A software device pays more for a workgroup than for most items, so it takes larger groups.
-pub(crate) fn few(gpu: &Gpu) -> u32 {
-    if gpu.is_software() { 16 } else { 4 }
-}
-
-/// The constant by which passes know [`few`].
-pub(crate) fn few_constant(gpu: &Gpu) -> (&'static str, f64) {
-    ("ITEMS_PER_GROUP", few(gpu).into())
 }
 
 /// The constant by which passes know the fewest workgroups that draw splats, so that large ones are not left to a few
@@ -172,6 +155,9 @@ indices! {
         /// Queries of each round that one pass of the search leaves to another.
         LeftActive,
         LeftRecovered,
+        /// Surfels of each round that need balls of their own.
+        BallsActive,
+        BallsRecovered,
     }
 }
 
@@ -196,6 +182,7 @@ pub(crate) struct ScreenBuffers {
     pub(crate) capacity: u32,
     /// One `u32` per [`Counter`].
     pub(crate) counters: wgpu::Buffer,
+    /// Keys of the owners of slots, which are empty between frames: `imports/keys.wgsl`.
     keys: wgpu::Buffer,
     /// Number of points of each cell around the eye, then entries for each.
     near: wgpu::Buffer,
@@ -215,7 +202,7 @@ pub(crate) struct ScreenBuffers {
     /// Indices of the screen points to reconstruct: the active points, then the recovered.
     pub(crate) queries: wgpu::Buffer,
     pub(crate) passive: wgpu::Buffer,
-    /// Queries of a round that one pass of the search leaves to another.
+    /// What one pass leaves to another: queries of the search, then surfels that need balls of their own.
     pub(crate) left: wgpu::Buffer,
     pub(crate) block_sums: wgpu::Buffer,
     /// Depth per pixel, pushed back by ε, row by row, as `shared/depth_map.wgsl` has it; infinite where nothing is.
@@ -279,7 +266,7 @@ impl ScreenBuffers {
     pub(crate) fn groups(&self, work: Work) -> Groups {
         let told = match work {
             Work::Visible256 | Work::VisibleBlocks => 0,
-            Work::PassiveBlocks | Work::Active64 | Work::Active256 | Work::ActiveFew | Work::ActiveDrawn => 1,
+            Work::PassiveBlocks | Work::Active64 | Work::Active256 | Work::ActiveDrawn => 1,
             _ => 2,
         };
         Groups::Counted(self.arguments[told].clone(), work as u64 * DISPATCH_BYTES)
@@ -305,7 +292,7 @@ impl WorkPass {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Pass::new(gpu, &WORK, &[few_constant(gpu), drawing_constant(gpu)]).map(Self)
+        Pass::new(gpu, &WORK, &[drawing_constant(gpu)]).map(Self)
     }
 
     /// The step to run after counters of the search have changed.
@@ -419,7 +406,7 @@ impl ProjectPasses {
             compact: pass(&COMPACT)?,
             gather: pass(&GATHER)?,
             split_count: pass(&SPLIT_COUNT)?,
-            split: Pass::new(gpu, &SPLIT, &[few_constant(gpu), drawing_constant(gpu)])?,
+            split: Pass::new(gpu, &SPLIT, &[drawing_constant(gpu)])?,
         })
     }
 
@@ -438,18 +425,18 @@ impl ProjectPasses {
         let [width, height] = screen.size;
         let slots = (width * height) << u32::from(screen.halves);
         let slot_blocks = slots.div_ceil(RANK_BLOCK_FLAGS);
-        let cleared = slots.max(near::NEAR_CELLS as u32);
-        let clear = [frame, keys, density, counters, sixteenths, near, depth, centers];
+        let cleared = (width * height).max(near::NEAR_CELLS as u32);
+        let clear = [frame, density, counters, sixteenths, near, depth, centers];
         let mut steps = vec![self.clear.step(gpu, &clear, cleared.div_ceil(GROUP))];
         steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
         const BLOCK_PX: u32 = cpu::OCCUPANCY_BLOCK_PX as u32;
         let covered_blocks = width.div_ceil(BLOCK_PX) * height.div_ceil(BLOCK_PX);
-        steps.push(self.occupancy.step(gpu, &[frame, keys, counters], covered_blocks));
+        steps.push(self.occupancy.step(gpu, &[frame, keys, counters, sixteenths], covered_blocks));
         // Blocks beyond the slots, which only hold points of sparse cells, count none.
         let blocks = slots.max(screen.capacity).div_ceil(RANK_BLOCK_FLAGS);
-        let count = [frame, keys, counters, block_sums, density, near, source, names, &arguments[0]];
+        let count = [frame, keys, counters, block_sums, density, near, source, sixteenths, &arguments[0]];
         steps.push(self.count.step(gpu, &count, 1 + blocks));
-        let compact = [frame, keys, counters, block_sums, source, pixels, cell_start, names];
+        let compact = [frame, keys, counters, block_sums, source, pixels, cell_start, names, sixteenths];
         steps.push(self.compact.step(gpu, &compact, slot_blocks));
         for chunk in cloud.chunks() {
             let Chunk { uniform, positions, values: stored, .. } = chunk;

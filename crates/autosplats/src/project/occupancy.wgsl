@@ -1,15 +1,17 @@
 // Erases points far behind the other point of their pixel. Counts the screen points, and the blocks of pixels
 // that hold any. These blocks are the covered part of the screen, whose density determines the sizes of cells.
 //
-// Reads and writes: keys. Writes: counters. One workgroup per block.
+// Reads: sixteenths. Reads and writes: keys. Writes: counters. One workgroup per block.
 
 #import frame
 #import divide
 #import groups
+#import held
 #import keys
 
 @group(0) @binding(1) var<storage, read_write> keys: array<Key>;
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read> sixteenths: array<u32>;
 
 var<workgroup> owned: atomic<u32>;
 
@@ -23,15 +25,13 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     let block = divide(group_index(workgroup), columns);
     let pixel = OCCUPANCY_BLOCK_PX * block.yx + vec2u(local % OCCUPANCY_BLOCK_PX, local / OCCUPANCY_BLOCK_PX);
     if all(pixel < frame.size) {
-        let slot = (pixel.y * frame.size.x + pixel.x) << frame.halves;
-        var own = u32(keys[slot].ordinal != NO_POINT);
-        if frame.halves == 1u && keys[slot + 1u].ordinal != NO_POINT {
-            own += 1u;
-            if own == 2u && erase_far(slot) {
-                own = 1u;
-            }
+        let marks = pixel_sixteenths(pixel);
+        if marks != 0u {
+            let first = half_sixteenths(pixel, 0u);
+            let has_both = frame.halves == 1u && (marks & first) != 0u && (marks & ~first) != 0u;
+            let erases = has_both && erase_far(2u * (pixel.y * frame.size.x + pixel.x));
+            atomicAdd(&owned, select(1u, 2u, has_both && !erases));
         }
-        atomicAdd(&owned, own);
     }
     workgroupBarrier();
     if local == 0u && atomicLoad(&owned) > 0u {
@@ -42,7 +42,7 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
 
 // Empties the slot of a pixel's farther point if it lies too far behind the nearer; returns whether it does.
 fn erase_far(slot: u32) -> bool {
-    let depth = vec2f(bitcast<f32>(keys[slot].depth), bitcast<f32>(keys[slot + 1u].depth));
+    let depth = bitcast<vec2f>(vec2u(depth_of(keys[slot]), depth_of(keys[slot + 1u])));
     let near = min(depth.x, depth.y);
     if max(depth.x, depth.y) <= near + MAX_SECOND_DEPTH_PX * pixel_size(near) {
         return false;

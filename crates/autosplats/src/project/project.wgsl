@@ -1,4 +1,4 @@
-// Every point goes to its pixel, or half pixel, and the nearest wins [Paper, §3], by a 64-bit atomic minimum.
+// Every point goes to its pixel, or half pixel, and the nearest wins [Paper, §3], by a 64-bit atomic maximum.
 //
 // Reads: a chunk of the cloud. Writes: keys, counters, sixteenths, near. `project_32` does the same with 32 bits.
 
@@ -27,8 +27,8 @@ fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         if projected.slot >= SLOT_OUTSIDE {
             count_dropped(projected.slot);
         } else {
-            let key = (u64(bitcast<u32>(projected.depth)) << 32u) | u64(ordinal_of(index));
-            atomicMin(&keys[projected.slot], key);
+            let key = (u64(~bitcast<u32>(projected.depth)) << 32u) | u64(~ordinal_of(index));
+            atomicMax(&keys[projected.slot], key);
             add_sixteenth(projected.sixteenths);
         }
     }

@@ -33,7 +33,7 @@ fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     let index = group_index(workgroup) * LARGE_GROUP + local;
     if is_drawn(index) {
         let projected = project_point(from_eye(index));
-        let depth = bitcast<u32>(projected.depth);
+        let depth = ~bitcast<u32>(projected.depth);
         if turn == 0u {
             count_near(projected, ordinal_of(index));
         }
@@ -43,12 +43,12 @@ fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             }
         } else if turn == 0u {
             // Most points lie behind others; a load shows this.
-            if depth < atomicLoad(&keys[projected.slot].depth) {
-                atomicMin(&keys[projected.slot].depth, depth);
+            if depth > atomicLoad(&keys[projected.slot].depth) {
+                atomicMax(&keys[projected.slot].depth, depth);
             }
             add_sixteenth(projected.sixteenths);
         } else if atomicLoad(&keys[projected.slot].depth) == depth {
-            atomicMin(&keys[projected.slot].ordinal, ordinal_of(index));
+            atomicMax(&keys[projected.slot].ordinal, ~ordinal_of(index));
         }
     }
     count_dropped_finish(local);

@@ -1,5 +1,5 @@
 // Like `project`, for devices whose 64-bit atomics can load and whose invocations run in subgroups. Most points lose:
-// they lie behind the nearest point that is known, or beside a nearer one. Such points ask for no atomic minimum.
+// they lie behind the nearest point that is known, or beside a nearer one. Such points ask for no atomic maximum.
 //
 // Reads: a chunk of the cloud. Writes: keys, counters, sixteenths, near.
 
@@ -56,9 +56,9 @@ fn project_lanes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocat
             }
         }
         if !loses(slot, depth, ordinal) && slot != SLOT_NONE {
-            let key = (u64(depth) << 32u) | u64(ordinal);
-            if key < atomicLoad(&keys[slot]) {
-                atomicMin(&keys[slot], key);
+            let key = (u64(~depth) << 32u) | u64(~ordinal);
+            if key > atomicLoad(&keys[slot]) {
+                atomicMax(&keys[slot], key);
             }
         }
     }

@@ -20,7 +20,7 @@ use crate::adapt::FrameStatistics;
 use crate::fit::{SUPPORT, Surfel};
 use crate::gpu::{Gpu, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
 use crate::project::MARGIN_REACH;
-use crate::project::gpu::{Counter, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, drawing_constant, few_constant};
+use crate::project::gpu::{Counter, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, drawing_constant};
 
 /// Imports and constants of the passes.
 const LIBRARY: Library = Library {
@@ -205,7 +205,7 @@ impl SplatPasses {
             boxes: pass(&BOXES)?,
             depth: [depth(0.0)?, depth(1.0)?],
             recover_count: pass(&RECOVER_COUNT)?,
-            recover: Pass::new(gpu, &RECOVER, &[few_constant(gpu), groups])?,
+            recover: Pass::new(gpu, &RECOVER, &[groups])?,
             refine: pass(&REFINE)?,
             erase: Pass::new(gpu, &ERASE, &[groups])?,
             redraw: Pass::new(gpu, &REDRAW, &[groups])?,

@@ -327,19 +327,21 @@ fn the_frames_before_leave_no_trace() {
     let (other, _) = scene("statue", 50_000);
     let step = |part: f64| Camera { eye: camera.eye + part * (camera.look_at - camera.eye), ..camera };
     let frames = [
-        (&cloud, step(0.0), SIZE),
-        (&cloud, step(0.0), SIZE),
-        (&cloud, step(0.02), SIZE),
-        (&cloud, step(0.3), SIZE),
-        (&other, step(0.3), SIZE),
-        (&cloud, step(0.31), [SIZE[0] / 2, SIZE[1]]),
-        (&cloud, step(0.31), SIZE),
+        (&cloud, step(0.0), SIZE, 2),
+        (&cloud, step(0.0), SIZE, 2),
+        (&cloud, step(0.02), SIZE, 2),
+        (&cloud, step(0.3), SIZE, 2),
+        (&other, step(0.3), SIZE, 2),
+        (&cloud, step(0.31), [SIZE[0] / 2, SIZE[1]], 2),
+        (&cloud, step(0.31), SIZE, 1),
+        (&other, step(0.0), SIZE, 1),
+        (&cloud, step(0.31), SIZE, 2),
     ];
     let renderers = [10, 17].into_iter().flat_map(|k| [(Some(Renderer::new()), k), (crate::gpu(), k)]);
     for (mut renderer, k) in renderers.filter_map(|(renderer, k)| Some((renderer?, k))) {
-        let reconstruction = Reconstruction { k, ..Reconstruction::default() };
-        let settings = Settings { reconstruction, all_layers: true, ..Settings::default() };
-        for (at, (cloud, camera, size)) in frames.iter().enumerate() {
+        for (at, (cloud, camera, size, points_per_pixel)) in frames.iter().enumerate() {
+            let reconstruction = Reconstruction { k, points_per_pixel: *points_per_pixel, ..Reconstruction::default() };
+            let settings = Settings { reconstruction, all_layers: true, ..Settings::default() };
             let picture = |renderer: &mut Renderer, settings: &Settings| {
                 let frame = renderer.render(*cloud, camera, *size, settings).expect("a picture");
                 let depths: Vec<u32> = frame.layers.depth.iter().map(|depth| depth.to_bits()).collect();

@@ -91,6 +91,19 @@ fn project<'a>(
     rules: &ProjectRules,
 ) -> (ScreenPoints, Vec<u32>) {
     let points = points.into();
+    let screen = ScreenBuffers::new(gpu, [view.width, view.height], rules.halves, points.room(), 0).expect("room");
+    project_into(gpu, passes, points, view, rules, &screen)
+}
+
+/// Like [`project`], into buffers that may have seen other frames.
+fn project_into(
+    gpu: &Gpu,
+    passes: &ProjectPasses,
+    points: Points<'_>,
+    view: &View,
+    rules: &ProjectRules,
+    screen: &ScreenBuffers,
+) -> (ScreenPoints, Vec<u32>) {
     let written = points.written_since(None);
     let mut uploader = Uploader::default();
     let mut device_cloud = DeviceCloud::default();
@@ -98,7 +111,6 @@ fn project<'a>(
     uploader.positions(gpu, points.positions(), &written, &device_cloud, &|_| true).expect("an upload");
     uploader.values(gpu, &PointValues::default(), &written, &device_cloud, &|_| true).expect("an upload");
     device_cloud.write_slots(gpu, &SlotTable::new(points, view));
-    let screen = ScreenBuffers::new(gpu, [view.width, view.height], rules.halves, points.room(), 0).expect("room");
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     let told = FrameUniform {
         halves: rules.halves.into(),
@@ -108,11 +120,11 @@ fn project<'a>(
     };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
     let mut recorder = Recorder::new(gpu, &Clock::Off);
-    passes.steps(gpu, &frame, &device_cloud, &screen).iter().for_each(|step| recorder.run(step));
+    passes.steps(gpu, &frame, &device_cloud, screen).iter().for_each(|step| recorder.run(step));
     recorder.finish();
     let pixels = view.width as usize * view.height as usize;
     let sixteenths = read_back(gpu, &screen.sixteenths, pixels.div_ceil(2)).expect("sixteenths");
-    (read_screen(gpu, &screen).0, sixteenths)
+    (read_screen(gpu, screen).0, sixteenths)
 }
 
 /// Fraction of the points of `a` that own another pixel, or none, in `b`.
@@ -182,5 +194,46 @@ fn assert_same(host: &ScreenPoints, device: &ScreenPoints, case: &str) {
             (a - b).abs() <= 4e-6 * b.abs().max(4.0)
         });
         assert!(near && a.pixel == b.pixel, "{case}: {a:?} is not {b:?}");
+    }
+}
+
+/// Keys stay from frame to frame. They must be empty then, whatever was seen.
+#[test]
+fn screens_keep_no_keys() {
+    let Some(gpu) = test_gpu() else { return };
+    let ways = [Nearest::InLanes, Nearest::Once, Nearest::Twice].into_iter().filter(|way| way.fits(&gpu));
+    let clouds: Vec<_> = test_clouds::all(3000)
+        .into_iter()
+        .map(|(name, positions)| (name, PointCloud::new(DVec3::ZERO, positions)))
+        .collect();
+    let room = clouds.iter().map(|(_, cloud)| cloud.len()).max().expect("clouds");
+    let projection = Projection::PerspectiveFovDeg(40.0);
+    for way in ways {
+        let passes = ProjectPasses::new(&gpu, way).expect("passes");
+        for (size, halves) in [([121, 90], true), ([121, 90], false), ([33, 47], true)] {
+            let screen = ScreenBuffers::new(&gpu, size, halves, room, 0).expect("room");
+            let slots = slots(size, halves);
+            assert_eq!(screen.keys.size() as usize, slots * size_of::<u64>());
+            // From afar and from within, where points are near the eye.
+            for (frame, (name, cloud)) in clouds.iter().enumerate() {
+                let eye = if frame % 3 == 2 { 0.2 * EYE } else { EYE };
+                let look_at = DVec3::new(0.1 * (frame % 2) as f64, 0.0, 0.0);
+                let camera = Camera { eye, look_at, up: DVec3::new(0.1, -1.0, 0.0), projection };
+                let view = camera.view(DVec3::ZERO, size).expect("a view");
+                let rules = ProjectRules { k: K, halves, grid_culling: true, near: true };
+                let after = project_into(&gpu, &passes, cloud.into(), &view, &rules, &screen);
+                let keys: Vec<u64> = read_back(&gpu, &screen.keys, slots).expect("keys");
+                let case = format!("{name} {size:?} {halves} {way:?}");
+                assert_eq!(keys.iter().filter(|&&key| key != 0).count(), 0, "{case}: keys are left");
+                let (fresh, sixteenths) = project(&gpu, &passes, cloud, &view, &rules);
+                assert_eq!(after.1, sixteenths, "{case}: sixteenths");
+                assert_eq!(
+                    bytemuck::cast_slice::<_, u32>(&after.0.points),
+                    bytemuck::cast_slice(&fresh.points),
+                    "{case}"
+                );
+                assert_same(&fresh, &after.0, &case);
+            }
+        }
     }
 }

@@ -8,6 +8,8 @@ struct CellSlot {
     // Index among the keys.
     slot: u32,
     pixel: vec2u,
+    // Which half of the pixel it is; 0 if pixels are whole.
+    half: u32,
     // Whether the slot is the first of its cell, and the cell's index.
     first: bool,
     cell: u32,
@@ -25,5 +27,5 @@ fn cell_slot(at_slot: u32, strip_px: u32) -> CellSlot {
     let place = divide(at - top * frame.size.x, height);
     let pixel = vec2u(place.x, top + place.y);
     let slot = ((pixel.y * frame.size.x + pixel.x) << frame.halves) + half;
-    return CellSlot(slot, pixel, place.y == 0u && half == 0u, strip * frame.size.x + pixel.x);
+    return CellSlot(slot, pixel, half, place.y == 0u && half == 0u, strip * frame.size.x + pixel.x);
 }

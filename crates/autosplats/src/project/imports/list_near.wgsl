@@ -1,9 +1,8 @@
-// Lists the points of the sparse cells around the eye after the screen points, if any is near: see `near.rs`. Each
-// invocation takes a run of cells. The including pass binds `near` and `names` for reading, and `counters`, `source`
-// and `arguments`.
+// Lists the points of the sparse cells around the eye after the screen points, if any is near: see `near.rs`. The list
+// has their ordinals, for which `compact` puts indices. Each invocation takes a run of cells. The including pass binds
+// `near` for reading, and `counters`, `source` and `arguments`.
 
 #import frame
-#import names
 #import near_cells
 #import near_points
 #import put_work
@@ -92,7 +91,7 @@ fn list_near(local: u32) {
             for (var other = 0u; other < len; other++) {
                 rank += u32(is_before(first_entry + other * ENTRY_WORDS, own_entry));
             }
-            source[place + rank] = index_of(near[own_entry]);
+            source[place + rank] = near[own_entry];
         }
         place += len;
     }
