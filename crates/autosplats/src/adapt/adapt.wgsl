@@ -14,7 +14,6 @@
 #import later
 #import levels
 #import noise
-#import round
 #import sheet
 #import surfel
 
@@ -34,18 +33,17 @@ override SURFELS_PER_GROUP: u32;
 
 // Leaves a surfel to `fit_balls`. The order does not matter, as each is fitted by itself.
 fn leave(place: u32) {
-    let at = atomicAdd(&counters[BALLS_ACTIVE + ROUND], 1u);
+    let at = atomicAdd(&counters[BALLS_ACTIVE + atomicLoad(&counters[ROUND])], 1u);
     left[at] = place;
     if at % SURFELS_PER_GROUP == 0u && at / SURFELS_PER_GROUP < GROUPS_PER_ROW {
-        atomicAdd(&arguments[3u * (1u + ROUND)], 1u);
+        atomicAdd(&arguments[3u * (1u + atomicLoad(&counters[ROUND]))], 1u);
     }
 }
 
 @compute @workgroup_size(SMALL_GROUP)
 fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let active_points = atomicLoad(&counters[ACTIVE]);
-    let first_of_round = select(0u, active_points, ROUND == 1u);
-    let len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+    let first_of_round = atomicLoad(&counters[ROUND_FIRST]);
+    let len = atomicLoad(&counters[ROUND_LEN]);
     let index = group_index(workgroup) * SMALL_GROUP + local;
     if index >= len {
         return;

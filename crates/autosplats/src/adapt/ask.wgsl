@@ -9,7 +9,6 @@
 #import groups
 #import levels
 #import noise
-#import round
 #import screen
 #import surfel
 
@@ -31,10 +30,10 @@ struct Asked {
 fn ask(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let level = levels[statistics.sheet_level];
     let index = group_index(workgroup) * SMALL_GROUP + local;
-    if index >= select(counters[ACTIVE], counters[RECOVERED], ROUND == 1u) || level.side_px == 0u {
+    if index >= counters[ROUND_LEN] || level.side_px == 0u {
         return;
     }
-    let surfel = surfels[select(0u, counters[ACTIVE], ROUND == 1u) + index];
+    let surfel = surfels[counters[ROUND_FIRST] + index];
     let measured_noise = noise_at(statistics.noise, surfel.k_radius);
     let known = known_beyond(measured_noise, surfel.center, surfel.source);
     let noise = max(measured_noise, known.noise);

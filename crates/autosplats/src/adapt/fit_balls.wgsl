@@ -13,7 +13,6 @@
 #import depth_noise
 #import levels
 #import noise
-#import round
 #import rows
 #import sheet
 #import surfel
@@ -61,7 +60,7 @@ fn fit_balls(
     own_place = local;
     if local == 0u {
         task = Task(
-            atomicLoad(&counters[BALLS_ACTIVE + ROUND]),
+            atomicLoad(&counters[BALLS_ACTIVE + atomicLoad(&counters[ROUND])]),
             atomicLoad(&counters[CELL_PX]),
             atomicLoad(&counters[CELL_COLUMNS]),
         );

@@ -269,10 +269,9 @@ pub(crate) struct AdaptPasses {
     quantile: Pass,
     noise: Pass,
     fit_sheets: Pass,
-    /// One pass per round, as the next two.
-    ask: [Pass; 2],
-    adapt: [Pass; 2],
-    fit_balls: [Pass; 2],
+    ask: Pass,
+    adapt: Pass,
+    fit_balls: Pass,
 }
 
 impl AdaptPasses {
@@ -298,9 +297,6 @@ impl AdaptPasses {
         let cells = ("CELLS_PER_GROUP", CELLS_PER_GROUP[kind].into());
         let surfels = ("SURFELS_PER_GROUP", SURFELS_PER_GROUP[kind].into());
         let pass = |source| Pass::new(gpu, source, &[]);
-        let ask = |round: Round| Pass::new(gpu, &ASK, &[round.constant()]);
-        let adapt = |round: Round| Pass::new(gpu, &ADAPT, &[round.constant(), surfels]);
-        let fit_balls = |round: Round| Pass::new(gpu, &FIT_BALLS, &[round.constant(), together]);
         let most_finest = ("MOST_FINEST", most_finest(gpu.most_bound()) as f64);
         Ok(Self {
             fill: Pass::new(gpu, &FILL, &[most_finest, coarser])?,
@@ -312,9 +308,9 @@ impl AdaptPasses {
             quantile: pass(&QUANTILES)?,
             noise: Pass::new(gpu, &NOISE, &[cells])?,
             fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[together, cells])?,
-            ask: [ask(Round::Active)?, ask(Round::Recovered)?],
-            adapt: [adapt(Round::Active)?, adapt(Round::Recovered)?],
-            fit_balls: [fit_balls(Round::Active)?, fit_balls(Round::Recovered)?],
+            ask: pass(&ASK)?,
+            adapt: Pass::new(gpu, &ADAPT, &[surfels])?,
+            fit_balls: Pass::new(gpu, &FIT_BALLS, &[together])?,
         })
     }
 
@@ -365,13 +361,12 @@ impl AdaptPasses {
         let fit = [frame, levels, clusters, statistics, asked, depth_noise, sheets];
         let adapt = [frame, counters, density, levels, statistics, sheets, depth_noise, surfels, left, arguments];
         let balls = [frame, counters, density, levels, clusters, statistics, sheets, depth_noise, surfels, left];
-        let round_at = round as usize;
         let balls_at = (1 + round as u64) * DISPATCH_BYTES;
         steps.extend([
-            self.ask[round_at].step(gpu, &ask, screen.groups(round.work_64())),
+            self.ask.step(gpu, &ask, screen.groups(round.work_64())),
             self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), 0)),
-            self.adapt[round_at].step(gpu, &adapt, screen.groups(round.work_64())),
-            self.fit_balls[round_at].step(gpu, &balls, Groups::Counted(arguments.clone(), balls_at)),
+            self.adapt.step(gpu, &adapt, screen.groups(round.work_64())),
+            self.fit_balls.step(gpu, &balls, Groups::Counted(arguments.clone(), balls_at)),
         ]);
         steps
     }

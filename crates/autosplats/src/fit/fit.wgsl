@@ -9,7 +9,6 @@
 #import groups
 #import neighborhood
 #import orthonormal
-#import round
 #import screen
 #import surfel
 
@@ -188,9 +187,8 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
 @compute @workgroup_size(SMALL_GROUP)
 fn fit(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
-        let active_points = atomicLoad(&counters[ACTIVE]);
-        task.first = select(0u, active_points, ROUND == 1u);
-        task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+        task.first = atomicLoad(&counters[ROUND_FIRST]);
+        task.len = atomicLoad(&counters[ROUND_LEN]);
         task.cell_px = atomicLoad(&counters[CELL_PX]);
         task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
         task.points = atomicLoad(&counters[VISIBLE]);

@@ -38,10 +38,10 @@ pub(crate) fn surfel_buffer(gpu: &Gpu, capacity: u32) -> Result<wgpu::Buffer, Er
     gpu.storage::<Surfel>("surfels", capacity as usize)
 }
 
-/// The passes of the fit, one per round.
+/// The pass of the fit.
 #[derive(Debug)]
 pub(crate) struct FitPasses {
-    rounds: [Pass; 2],
+    fit: Pass,
 }
 
 impl FitPasses {
@@ -50,8 +50,7 @@ impl FitPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        let round = |round: Round| Pass::new(gpu, &FIT, &[round.constant()]);
-        Ok(Self { rounds: [round(Round::Active)?, round(Round::Recovered)?] })
+        Ok(Self { fit: Pass::new(gpu, &FIT, &[])? })
     }
 
     /// Fits surfels to the neighbourhoods of the queries of `round`.
@@ -66,7 +65,7 @@ impl FitPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, points, source, queries, .. } = screen;
         let buffers = [frame, counters, density, points, source, queries, neighborhoods, surfels];
-        vec![self.rounds[round as usize].step(gpu, &buffers, screen.groups(round.work_64()))]
+        vec![self.fit.step(gpu, &buffers, screen.groups(round.work_64()))]
     }
 }
 

@@ -94,7 +94,7 @@ const SHARED: Library = Library {
     files: &[files!(in "../shared":
         "cloud_points", "density", "depth_map", "divide", "drawing_groups", "eigen", "frame", "groups", "half",
         "layers", "lines", "matters", "moved", "names", "neighborhood", "noise", "orthonormal", "picture",
-        "project_point", "put_rounds", "put_work", "range_keys", "rank", "reproject", "round", "screen", "sum_before",
+        "project_point", "put_rounds", "put_work", "range_keys", "rank", "reproject", "screen", "sum_before",
         "surfel",
     )],
     constants: &[constants![

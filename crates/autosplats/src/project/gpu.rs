@@ -72,11 +72,6 @@ indices! {
 }
 
 impl Round {
-    /// The constant by which passes know the round.
-    pub(crate) fn constant(self) -> (&'static str, f64) {
-        ("ROUND", f64::from(self as u32))
-    }
-
     /// Dispatch with 64 queries per workgroup.
     pub(crate) fn work_64(self) -> Work {
         [Work::Active64, Work::Recovered64][self as usize]
@@ -139,6 +134,11 @@ indices! {
         Active,
         Passive,
         Recovered,
+        /// Number of the round, its first query and its number of queries: at first the active points, then those that
+        /// were recovered. So passes of both rounds are the same, and compiled once.
+        Round,
+        RoundFirst,
+        RoundLen,
         /// Points with fewer than k neighbours because of a gap or the bound on work.
         Clamped,
         /// Points that reached the bound on work.

@@ -57,6 +57,7 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     if block == (max(visible, 1u) - 1u) / RANK_BLOCK_FLAGS && local == 0u {
         let active_len = active_before + block_sums[block];
         counters[ACTIVE] = active_len;
+        counters[ROUND_LEN] = active_len;
         counters[PASSIVE] = visible - active_len;
         put_active(active_len);
         // One block at least: the last tells how many points are recovered.

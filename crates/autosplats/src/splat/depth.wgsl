@@ -17,13 +17,11 @@
 @group(0) @binding(4) var<storage, read> large: array<u32>;
 @group(0) @binding(5) var<storage, read_write> depth_map: array<atomic<u32>>;
 
-// Whether to draw only the recovered splats.
-override RECOVERED_ONLY: bool;
 @compute @workgroup_size(LARGE_GROUP)
 fn depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let group = group_index(workgroup);
-    let first = select(0u, counters[ACTIVE], RECOVERED_ONLY);
-    let len = counters[ACTIVE] + counters[RECOVERED] - first;
+    let first = counters[ROUND_FIRST];
+    let len = counters[ROUND_LEN];
     let index = group * LARGE_GROUP + local;
     clear_lines(local);
     if index < len {

@@ -157,10 +157,9 @@ impl SplatBuffers {
 /// The passes of splatting.
 #[derive(Debug)]
 pub(crate) struct SplatPasses {
-    /// For each [`Round`].
-    set_up: [Pass; 2],
+    set_up: Pass,
     boxes: Pass,
-    depth: [Pass; 2],
+    depth: Pass,
     recover_count: Pass,
     recover: Pass,
     refine: Pass,
@@ -182,9 +181,7 @@ impl SplatPasses {
     /// [`Error::Device`], [`Error::DeviceMemory`].
     pub(crate) fn new(gpu: &Gpu, channels: Channels, linear: &[f32; 256]) -> Result<Self, Error> {
         let pass = |source| Pass::new(gpu, source, &[]);
-        let set_up = |recovered: f64| Pass::new(gpu, &SET_UP, &[("RECOVERED_ONLY", recovered)]);
         let groups = drawing_constant(gpu);
-        let depth = |recovered: f64| Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), groups]);
         let Channels { color, scalar, measures, backs } = channels;
         let slots = |carried: bool| if carried { f64::from(BATCH) } else { 1.0 };
         let attributes = [
@@ -201,9 +198,9 @@ impl SplatPasses {
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
         Ok(Self {
-            set_up: [set_up(0.0)?, set_up(1.0)?],
+            set_up: pass(&SET_UP)?,
             boxes: pass(&BOXES)?,
-            depth: [depth(0.0)?, depth(1.0)?],
+            depth: Pass::new(gpu, &DEPTH, &[groups])?,
             recover_count: pass(&RECOVER_COUNT)?,
             recover: Pass::new(gpu, &RECOVER, &[groups])?,
             refine: pass(&REFINE)?,
@@ -228,11 +225,10 @@ impl SplatPasses {
     ) -> Vec<Step> {
         let SplatBuffers { splats: list, tree, large, .. } = splats;
         let ScreenBuffers { counters, depth, centers, .. } = screen;
-        let at = round as usize;
         let set_up = [frame, counters, surfels, list, tree, large, centers];
         vec![
-            self.set_up[at].step(gpu, &set_up, screen.groups(round.work_256())),
-            self.depth[at].step(gpu, &[frame, counters, list, tree, large, depth], screen.groups(round.work_drawn())),
+            self.set_up.step(gpu, &set_up, screen.groups(round.work_256())),
+            self.depth.step(gpu, &[frame, counters, list, tree, large, depth], screen.groups(round.work_drawn())),
         ]
     }
 

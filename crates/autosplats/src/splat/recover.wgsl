@@ -1,5 +1,5 @@
 // Appends the marked passive points to the active ones, ascending [Paper, §7, Grid Culling]. The last block tells their
-// number.
+// number, and begins the second round.
 //
 // Reads: passive, block_sums. Reads and writes: counters. Writes: queries, arguments.
 
@@ -41,6 +41,9 @@ fn recover(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     if block == (max(counters[PASSIVE], 1u) - 1u) / RANK_BLOCK_FLAGS && local == 0u {
         let recovered_len = recovered_before + block_sums[block];
         counters[RECOVERED] = recovered_len;
+        counters[ROUND] = 1u;
+        counters[ROUND_FIRST] = counters[ACTIVE];
+        counters[ROUND_LEN] = recovered_len;
         put_recovered(recovered_len, counters[ACTIVE]);
     }
 }

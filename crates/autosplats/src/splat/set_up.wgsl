@@ -17,20 +17,16 @@
 @group(0) @binding(5) var<storage, read_write> large: array<u32>;
 @group(0) @binding(6) var<storage, read_write> centers: array<atomic<u32>>;
 
-// Whether only the recovered surfels are new.
-override RECOVERED_ONLY: bool;
-
 // Empty bounds: the first pixel lies beyond all, the last is 0.
 const NOWHERE = 0x7fffu;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let active_points = atomicLoad(&counters[ACTIVE]);
-    let first = select(0u, active_points, RECOVERED_ONLY);
-    let index = first + group_index(workgroup) * LARGE_GROUP + local;
-    if index >= active_points + atomicLoad(&counters[RECOVERED]) {
+    let at = group_index(workgroup) * LARGE_GROUP + local;
+    if at >= atomicLoad(&counters[ROUND_LEN]) {
         return;
     }
+    let index = atomicLoad(&counters[ROUND_FIRST]) + at;
     let surfel = surfels[index];
     let c = vec3f(surfel.center.xy, center_depth(surfel.center));
     let n = surfel.normal;

@@ -6,8 +6,8 @@ use super::super::tests::{Case, K, PROJECTIONS, angle};
 use super::*;
 use crate::fit::gpu::surfel_buffer;
 use crate::fit::{Surfel, Surfels};
-use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
-use crate::project::gpu::tests::upload_screen;
+use crate::gpu::{FrameUniform, read_back, test_gpu};
+use crate::project::gpu::tests::{run_round, upload_screen};
 use crate::test_clouds::{self, noisy};
 
 /// Share of cells that may differ: rounding moves a few means into the next slab.
@@ -35,13 +35,10 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> DeviceResults {
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     let told = FrameUniform { longest: f32::MAX, ..FrameUniform::new(&case.view, K) };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
-    let mut recorder = Recorder::new(gpu, &Clock::Off);
-    let mut steps = passes.steps_cells(gpu, &frame, &screen, &buffers);
+    run_round(gpu, &screen, Round::Active, &passes.steps_cells(gpu, &frame, &screen, &buffers));
     for round in [Round::Active, Round::Recovered] {
-        steps.extend(passes.steps(gpu, &frame, &screen, &surfels, &buffers, round));
+        run_round(gpu, &screen, round, &passes.steps(gpu, &frame, &screen, &surfels, &buffers, round));
     }
-    steps.iter().for_each(|step| recorder.run(step));
-    recorder.finish();
     DeviceResults {
         cells: read_cells(gpu, &buffers, screen.size),
         usual: read_back(gpu, &buffers.statistics, 1).expect("statistics")[0],

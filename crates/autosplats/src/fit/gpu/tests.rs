@@ -8,8 +8,8 @@ use crate::camera::{Camera, Projection, View};
 use crate::fit::alone::FEW_NEIGHBORS;
 use crate::fit::tests::eigenvalues;
 use crate::fit::{FitRules, LONGEST, Surfels, fit};
-use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
-use crate::project::gpu::tests::upload_screen;
+use crate::gpu::{FrameUniform, read_back, test_gpu};
+use crate::project::gpu::tests::{run_round, upload_screen};
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::past::Past;
@@ -91,12 +91,10 @@ impl Case {
         };
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
         gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
-        let mut recorder = Recorder::new(gpu, &Clock::Off);
         for round in [Round::Active, Round::Recovered] {
             let steps = passes.steps(gpu, &frame, &buffers, &neighborhoods, &surfels, round);
-            steps.iter().for_each(|step| recorder.run(step));
+            run_round(gpu, &buffers, round, &steps);
         }
-        recorder.finish();
         let counters: Vec<u32> = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");
         let surfels = read_back(gpu, &surfels, moments.len()).expect("surfels");
         (surfels, counters[Counter::Outliers as usize] as usize)

@@ -30,10 +30,10 @@ pub(crate) fn write_sensors(gpu: &Gpu, sensors: &Sensors, to: &wgpu::Buffer) {
     gpu.queue.write_buffer(to, 0, bytemuck::cast_slice(&sensors.runs));
 }
 
-/// The pass, for each round.
+/// The pass.
 #[derive(Debug)]
 pub(crate) struct OrientPasses {
-    rounds: [Pass; 2],
+    orient: Pass,
 }
 
 impl OrientPasses {
@@ -42,8 +42,7 @@ impl OrientPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        let round = |round: Round| Pass::new(gpu, &ORIENT, &[round.constant()]);
-        Ok(Self { rounds: [round(Round::Active)?, round(Round::Recovered)?] })
+        Ok(Self { orient: Pass::new(gpu, &ORIENT, &[])? })
     }
 
     /// Marks the surfels of a round that show their back.
@@ -57,6 +56,6 @@ impl OrientPasses {
         round: Round,
     ) -> Step {
         let buffers = [frame, &screen.counters, sensors, surfels];
-        self.rounds[round as usize].step(gpu, &buffers, screen.groups(round.work_64()))
+        self.orient.step(gpu, &buffers, screen.groups(round.work_64()))
     }
 }

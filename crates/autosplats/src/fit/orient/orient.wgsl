@@ -4,7 +4,6 @@
 
 #import frame
 #import groups
-#import round
 #import surfel
 
 // Position of the sensor of a run of points.
@@ -46,9 +45,8 @@ fn is_seen_from_behind(surfel: Surfel, sensor: vec3f) -> bool {
 
 @compute @workgroup_size(SMALL_GROUP)
 fn orient(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let active_points = counters[ACTIVE];
-    let first = select(0u, active_points, ROUND == 1u);
-    let len = select(active_points, counters[RECOVERED], ROUND == 1u);
+    let first = counters[ROUND_FIRST];
+    let len = counters[ROUND_LEN];
     let index = group_index(workgroup) * SMALL_GROUP + local;
     if index >= len {
         return;

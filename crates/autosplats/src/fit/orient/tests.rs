@@ -6,9 +6,9 @@ use super::gpu::{OrientPasses, sensor_buffer, write_sensors};
 use super::*;
 use crate::camera::{Camera, Projection};
 use crate::cancel::NEVER;
-use crate::gpu::{Clock, FrameUniform, Gpu, Recorder, read_back, test_gpu};
+use crate::gpu::{FrameUniform, Gpu, read_back, test_gpu};
 use crate::project::Round;
-use crate::project::gpu::tests::find_work;
+use crate::project::gpu::tests::{find_work, run_round};
 use crate::project::gpu::{Counter, ScreenBuffers};
 use crate::test_clouds::Random;
 
@@ -160,10 +160,8 @@ fn on_device(gpu: &Gpu, passes: &OrientPasses, sensors: &Sensors, surfels: &[Sur
     let known = sensor_buffer(gpu, sensors.len()).expect("room");
     write_sensors(gpu, sensors, &known);
     let buffer = gpu.storage_with("surfels", surfels).expect("room");
-    let mut recorder = Recorder::new(gpu, &Clock::Off);
     for round in [Round::Active, Round::Recovered] {
-        recorder.run(&passes.step(gpu, &frame, &screen, &known, &buffer, round));
+        run_round(gpu, &screen, round, &[passes.step(gpu, &frame, &screen, &known, &buffer, round)]);
     }
-    recorder.finish();
     read_back(gpu, &buffer, surfels.len()).expect("surfels")
 }

@@ -82,6 +82,19 @@ pub(crate) fn find_work(gpu: &Gpu, screen: &ScreenBuffers) {
     recorder.finish();
 }
 
+/// Runs steps of a round, which it begins as `split` and `recover` do.
+pub(crate) fn run_round(gpu: &Gpu, screen: &ScreenBuffers, round: Round, steps: &[Step]) {
+    let counters: Vec<u32> = read_back(gpu, &screen.counters, COUNTERS).expect("counters");
+    let [active, recovered] = [Counter::Active, Counter::Recovered].map(|counter| counters[counter as usize]);
+    let [first, len] = [[0, active], [active, recovered]][round as usize];
+    for (counter, value) in [(Counter::Round, round as u32), (Counter::RoundFirst, first), (Counter::RoundLen, len)] {
+        gpu.queue.write_buffer(&screen.counters, 4 * counter as u64, bytemuck::bytes_of(&value));
+    }
+    let mut recorder = Recorder::new(gpu, &Clock::Off);
+    steps.iter().for_each(|step| recorder.run(step));
+    recorder.finish();
+}
+
 /// Projects a cloud on the device; returns the screen and the words of its sixteenths.
 fn project<'a>(
     gpu: &Gpu,
@@ -229,7 +242,7 @@ fn screens_keep_no_keys() {
                 assert_eq!(after.1, sixteenths, "{case}: sixteenths");
                 assert_eq!(
                     bytemuck::cast_slice::<_, u32>(&after.0.points),
-                    bytemuck::cast_slice(&fresh.points),
+                    bytemuck::cast_slice::<_, u32>(&fresh.points),
                     "{case}"
                 );
                 assert_same(&fresh, &after.0, &case);

@@ -143,8 +143,7 @@ pub(crate) struct KdTreePasses {
     scatter: Pass,
     small_tree: Pass,
     search: Pass,
-    /// One per round.
-    moments: [Pass; 2],
+    moments: Pass,
 }
 
 impl KdTreePasses {
@@ -152,7 +151,6 @@ impl KdTreePasses {
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let pass = |source| Pass::new(gpu, source, &[]);
-        let moments = |round: Round| Pass::new(gpu, &MOMENTS, &[round.constant()]);
         Ok(Self {
             begin: pass(&BEGIN)?,
             split: pass(&SPLIT)?,
@@ -161,7 +159,7 @@ impl KdTreePasses {
             scatter: pass(&SCATTER)?,
             small_tree: pass(&SMALL_TREE)?,
             search: pass(&SEARCH)?,
-            moments: [moments(Round::Active)?, moments(Round::Recovered)?],
+            moments: pass(&MOMENTS)?,
         })
     }
 
@@ -210,7 +208,7 @@ impl KdTreePasses {
             let (source, queries) = (&screen.source, &screen.queries);
             let moments =
                 [frame, &screen.counters, source, queries, &chunk.positions, radii, nodes, points, neighborhoods];
-            self.moments[round as usize].step(gpu, &moments, screen.groups(round.work_64()))
+            self.moments.step(gpu, &moments, screen.groups(round.work_64()))
         });
         first.push(active);
         [first, vec![recovered]]

@@ -9,7 +9,6 @@
 #import groups
 #import kd_tree
 #import neighborhood
-#import round
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> source: array<u32>;
@@ -95,9 +94,8 @@ fn find(own: u32) -> Found {
 @compute @workgroup_size(SMALL_GROUP)
 fn moments(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
-        let active_points = atomicLoad(&counters[ACTIVE]);
-        task.first = select(0u, active_points, ROUND == 1u);
-        task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+        task.first = atomicLoad(&counters[ROUND_FIRST]);
+        task.len = atomicLoad(&counters[ROUND_LEN]);
         atomicStore(&clamped, 0u);
         atomicStore(&bounded, 0u);
     }

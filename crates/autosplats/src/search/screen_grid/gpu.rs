@@ -74,37 +74,15 @@ pub(crate) fn neighborhood_buffer(gpu: &Gpu, capacity: u32) -> Result<wgpu::Buff
     gpu.storage::<Neighborhood>("neighbourhoods", capacity as usize)
 }
 
-/// The passes of the search, for each round.
+/// The passes of the search.
 #[derive(Debug)]
 pub(crate) struct SearchPasses {
-    rounds: [RoundPasses; 2],
-    work: WorkPass,
-}
-
-#[derive(Debug)]
-struct RoundPasses {
     /// Searches four queries at a time, if k is large enough, and leaves some queries to `one`.
     four: Option<Pass>,
     one: Pass,
     /// Searches the queries that `one` leaves.
     together: Option<Pass>,
-}
-
-impl RoundPasses {
-    fn new(gpu: &Gpu, k: u32, form: Form, round: Round) -> Result<Self, Error> {
-        let common = [round.constant(), ("K", k.into())];
-        let left_only = ("LEFT_ONLY", f64::from(u8::from(form == Form::Four)));
-        let most_rounds = |rounds: u32| ("MOST_ROUNDS", rounds.into());
-        let alone = most_rounds(if form == Form::OneOrMany { ROUNDS_ALONE } else { u32::MAX });
-        let pass = |of: Form, source, constants: &[_]| {
-            if of == form { Pass::new(gpu, source, &[&common, constants].concat()).map(Some) } else { Ok(None) }
-        };
-        Ok(Self {
-            four: pass(Form::Four, &SEARCH_FOUR, &[])?,
-            one: Pass::new(gpu, &SEARCH, &[&common[..], &[alone, left_only]].concat())?,
-            together: pass(Form::OneOrMany, &SEARCH_TOGETHER, &[most_rounds(u32::MAX)])?,
-        })
-    }
+    work: WorkPass,
 }
 
 impl SearchPasses {
@@ -117,9 +95,19 @@ impl SearchPasses {
     }
 
     fn with_form(gpu: &Gpu, k: u32, form: Form) -> Result<Self, Error> {
-        let round = |round: Round| RoundPasses::new(gpu, k, form, round);
-        let (active, recovered) = rayon::join(|| round(Round::Active), || round(Round::Recovered));
-        Ok(Self { rounds: [active?, recovered?], work: WorkPass::new(gpu)? })
+        let common = ("K", k.into());
+        let left_only = ("LEFT_ONLY", f64::from(u8::from(form == Form::Four)));
+        let most_rounds = |rounds: u32| ("MOST_ROUNDS", rounds.into());
+        let alone = most_rounds(if form == Form::OneOrMany { ROUNDS_ALONE } else { u32::MAX });
+        let pass = |of: Form, source, constants: &[_]| {
+            if of == form { Pass::new(gpu, source, &[&[common], constants].concat()).map(Some) } else { Ok(None) }
+        };
+        Ok(Self {
+            four: pass(Form::Four, &SEARCH_FOUR, &[])?,
+            one: Pass::new(gpu, &SEARCH, &[common, alone, left_only])?,
+            together: pass(Form::OneOrMany, &SEARCH_TOGETHER, &[most_rounds(u32::MAX)])?,
+            work: WorkPass::new(gpu)?,
+        })
     }
 
     /// Finds the neighbourhoods of the queries of `round`.
@@ -134,11 +122,11 @@ impl SearchPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, cell_start, points, queries, left, .. } = screen;
         let buffers = [frame, counters, density, cell_start, points, queries, neighborhoods, left, past];
-        let RoundPasses { four, one, together } = &self.rounds[round as usize];
+        let Self { four, one, together, work } = self;
         match four {
             Some(four) => vec![
                 four.step(gpu, &buffers, screen.groups(round.work_256())),
-                self.work.step(gpu, frame, screen),
+                work.step(gpu, frame, screen),
                 one.step(gpu, &buffers, screen.groups(round.left_64())),
             ],
             None => {

@@ -4,7 +4,6 @@
 
 #import frame
 #import communication
-#import round
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> arguments: Arguments;
@@ -12,7 +11,7 @@
 
 @compute @workgroup_size(1)
 fn begin() {
-    let queries = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
+    let queries = counters[ROUND_LEN];
     let has_work = select(0u, 1u, queries > 0u);
     arguments.points = Draw(BOX_VERTICES * counters[VISIBLE], 1u, 0u, 0u);
     arguments.queries = Draw(BOX_VERTICES * queries, 1u, 0u, 0u);
@@ -25,8 +24,8 @@ fn begin() {
     arguments.iterations = 0u;
     // Unconverged queries of each round, before the first iteration and after each.
     let curve = arrayLength(&convergence) / 2u;
-    convergence[ROUND * curve] = queries;
+    convergence[counters[ROUND] * curve] = queries;
     for (var at = 1u; at < curve; at++) {
-        convergence[ROUND * curve + at] = 0u;
+        convergence[counters[ROUND] * curve + at] = 0u;
     }
 }

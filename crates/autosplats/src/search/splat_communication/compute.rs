@@ -38,12 +38,6 @@ pub(crate) struct CommunicationPasses {
     clear: Pass,
     place: Pass,
     gather: Pass,
-    rounds: [RoundPasses; 2],
-}
-
-/// The passes that differ from round to round.
-#[derive(Debug)]
-struct RoundPasses {
     progress: ProgressPasses,
     ask: Pass,
     distribute: Pass,
@@ -56,21 +50,15 @@ impl CommunicationPasses {
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let pass = |source| Pass::new(gpu, source, &[]);
-        let round = |round: Round| {
-            let pass = |source| Pass::new(gpu, source, &[round.constant()]);
-            Ok::<_, Error>(RoundPasses {
-                progress: ProgressPasses::new(gpu, round)?,
-                ask: pass(&ASK)?,
-                distribute: pass(&DISTRIBUTE)?,
-                count: pass(&COUNT)?,
-                sum: pass(&SUM)?,
-            })
-        };
         Ok(Self {
             clear: pass(&CLEAR)?,
             place: pass(&PLACE)?,
             gather: pass(&GATHER)?,
-            rounds: [round(Round::Active)?, round(Round::Recovered)?],
+            progress: ProgressPasses::new(gpu)?,
+            ask: pass(&ASK)?,
+            distribute: pass(&DISTRIBUTE)?,
+            count: pass(&COUNT)?,
+            sum: pass(&SUM)?,
         })
     }
 }
@@ -98,28 +86,27 @@ impl EnginePasses for CommunicationPasses {
         let gather = [frame, points, pixels, counters, searches, told];
         let gather = self.gather.step(gpu, &gather, progress.points_groups());
         let steps = |round: Round| -> Vec<Step> {
-            let passes = &self.rounds[round as usize];
-            let mut steps = vec![passes.progress.begin(gpu, buffers, &progress)];
+            let mut steps = vec![self.progress.begin(gpu, buffers, &progress)];
             if round == Round::Active {
                 // Both rounds share the points.
                 steps.push(clear.clone());
             }
             steps.push(place.clone());
             let ask = [frame, queries, counters, searches];
-            steps.push(passes.ask.step(gpu, &ask, progress.queries_groups()));
+            steps.push(self.ask.step(gpu, &ask, progress.queries_groups()));
             let distribute = [frame, points, pixels, queries, counters, searches, told];
             let count = [frame, queries, counters, &progress.arguments, &progress.convergence, searches, told];
             let iteration = [
-                passes.distribute.step(gpu, &distribute, progress.queries_groups()),
+                self.distribute.step(gpu, &distribute, progress.queries_groups()),
                 gather.clone(),
-                passes.count.step(gpu, &count, progress.queries_groups()),
-                passes.progress.decide(gpu, buffers, &progress),
+                self.count.step(gpu, &count, progress.queries_groups()),
+                self.progress.decide(gpu, buffers, &progress),
             ];
             for _ in 0..ITERATIONS {
                 steps.extend(iteration.iter().cloned());
             }
             let sum = [frame, points, pixels, queries, counters, neighborhoods, searches, told];
-            steps.push(passes.sum.step(gpu, &sum, screen.groups(round.work_256())));
+            steps.push(self.sum.step(gpu, &sum, screen.groups(round.work_256())));
             steps
         };
         let rounds = [Round::Active, Round::Recovered].map(steps);

@@ -4,7 +4,6 @@
 
 #import frame
 #import communication
-#import round
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> arguments: Arguments;
@@ -12,12 +11,12 @@
 
 @compute @workgroup_size(1)
 fn decide() {
-    let at = ROUND * (arrayLength(&convergence) / 2u) + arguments.iterations;
+    let at = counters[ROUND] * (arrayLength(&convergence) / 2u) + arguments.iterations;
     if arguments.boxes.instances == 0u {
         convergence[at + 1u] = convergence[at];
     }
     arguments.iterations += 1u;
-    let queries = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
+    let queries = counters[ROUND_LEN];
     if f32(convergence[at + 1u]) <= UNCONVERGED * f32(queries) {
         arguments.clear.instances = 0u;
         arguments.boxes.instances = 0u;

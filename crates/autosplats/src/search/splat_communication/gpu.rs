@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::Error;
 use crate::gpu::{Constant, File, Gpu, Groups, Library, Pass, Step, constants, files, passes};
-use crate::project::gpu::{Counter, Round};
+use crate::project::gpu::Counter;
 use crate::search::MARGIN_PX;
 use crate::search::engine::SearchBuffers;
 
@@ -83,7 +83,7 @@ impl Progress {
     }
 }
 
-/// The passes of a round that begin and end iterations.
+/// The passes that begin and end iterations.
 #[derive(Debug)]
 pub(super) struct ProgressPasses {
     begin: Pass,
@@ -93,8 +93,8 @@ pub(super) struct ProgressPasses {
 impl ProgressPasses {
     /// # Errors
     /// [`Error::Device`].
-    pub(super) fn new(gpu: &Gpu, round: Round) -> Result<Self, Error> {
-        let pass = |source| Pass::new(gpu, source, &[round.constant()]);
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        let pass = |source| Pass::new(gpu, source, &[]);
         Ok(Self { begin: pass(&BEGIN)?, decide: pass(&DECIDE)? })
     }
 

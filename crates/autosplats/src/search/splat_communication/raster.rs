@@ -45,12 +45,6 @@ pub(crate) struct CommunicationPasses {
     gather: RasterPass,
     mean: RasterPass,
     covariance: RasterPass,
-    rounds: [RoundPasses; 2],
-}
-
-/// The passes that differ from round to round.
-#[derive(Debug)]
-struct RoundPasses {
     progress: ProgressPasses,
     ask: RasterPass,
     count: Pass,
@@ -67,16 +61,7 @@ impl CommunicationPasses {
             RasterPass::new(gpu, source, constants, targets, DepthMask::Greater)
         };
         let distribute = |last: bool| raster(&DISTRIBUTE, &[("IS_LAST", last.into())], &[Target::AddAndMax]);
-        let round = |round: Round| {
-            let pass = |source| Pass::new(gpu, source, &[round.constant()]);
-            Ok::<_, Error>(RoundPasses {
-                progress: ProgressPasses::new(gpu, round)?,
-                ask: raster(&ASK, &[round.constant()], &[Target::Replace])?,
-                count: pass(&COUNT)?,
-                keep_mean: pass(&KEEP_MEAN)?,
-                keep_covariance: pass(&KEEP_COVARIANCE)?,
-            })
-        };
+        let pass = |source| Pass::new(gpu, source, &[]);
         Ok(Self {
             mask: RasterPass::new(gpu, &MASK, &[], &[Target::Replace], DepthMask::Write)?,
             clear_feedback: raster(&CLEAR, &[], &[Target::Replace])?,
@@ -86,7 +71,11 @@ impl CommunicationPasses {
             gather: raster(&GATHER, &[], &GATHERED)?,
             mean: raster(&MEAN, &[], &GATHERED)?,
             covariance: raster(&COVARIANCE, &[], &GATHERED)?,
-            rounds: [round(Round::Active)?, round(Round::Recovered)?],
+            progress: ProgressPasses::new(gpu)?,
+            ask: raster(&ASK, &[], &[Target::Replace])?,
+            count: pass(&COUNT)?,
+            keep_mean: pass(&KEEP_MEAN)?,
+            keep_covariance: pass(&KEEP_COVARIANCE)?,
         })
     }
 }
@@ -175,17 +164,17 @@ struct BoundPasses<'a> {
 
 impl BoundPasses<'_> {
     fn steps(&self, round: Round) -> Vec<Step> {
-        let progress = &self.passes.rounds[round as usize].progress;
+        let progress = &self.passes.progress;
         let mut steps = vec![progress.begin(self.gpu, self.buffers, self.progress)];
         if round == Round::Active {
             // Both rounds share the points.
             steps.push(self.mask());
         }
-        steps.push(self.ask(round));
+        steps.push(self.ask());
         for _ in 0..ITERATIONS {
             steps.push(self.distribute(false));
             steps.push(self.gather(&self.passes.gather, at!(clear), at!(boxes)));
-            steps.push(self.count(round));
+            steps.push(self.count());
             steps.push(progress.decide(self.gpu, self.buffers, self.progress));
         }
         steps.push(self.distribute(true));
@@ -205,10 +194,10 @@ impl BoundPasses<'_> {
         Step::draw(targets, vec![self.draw(&self.passes.mask, &resources, at!(points))])
     }
 
-    fn ask(&self, round: Round) -> Step {
+    fn ask(&self) -> Step {
         let screen = self.buffers.screen;
         let resources = buffers([self.buffers.frame, &screen.points, &screen.queries, &screen.counters]);
-        let pass = &self.passes.rounds[round as usize].ask;
+        let pass = &self.passes.ask;
         let Textures { radii, depth, .. } = self.textures;
         let colors = vec![(radii.clone(), Load::Cleared([0.0; 4]))];
         let targets = Targets { colors, depth: depth.clone(), clear_depth: None };
@@ -237,24 +226,24 @@ impl BoundPasses<'_> {
         Step::draw(self.textures.into(&[counts, radii]), draws)
     }
 
-    fn count(&self, round: Round) -> Step {
+    fn count(&self) -> Step {
         let SearchBuffers { frame, screen, .. } = self.buffers;
         let Textures { positions, counts, radii, .. } = self.textures;
         let Progress { arguments, convergence } = self.progress;
         let mut resources = buffers([frame, &screen.points, &screen.queries, &screen.counters, arguments, convergence]);
         resources.extend(textures([positions, counts, radii]));
-        let count = &self.passes.rounds[round as usize].count;
+        let count = &self.passes.count;
         count.step_with(self.gpu, &resources, self.progress.queries_groups())
     }
 
     fn keep_mean(&self, round: Round) -> Step {
         let Textures { feedback, counts, radii, .. } = self.textures;
-        self.keep(&self.passes.rounds[round as usize].keep_mean, round, &[feedback, counts, radii])
+        self.keep(&self.passes.keep_mean, round, &[feedback, counts, radii])
     }
 
     fn keep_covariance(&self, round: Round) -> Step {
         let Textures { counts, radii, .. } = self.textures;
-        self.keep(&self.passes.rounds[round as usize].keep_covariance, round, &[counts, radii])
+        self.keep(&self.passes.keep_covariance, round, &[counts, radii])
     }
 
     fn keep(&self, pass: &Pass, round: Round, kept: &[&wgpu::TextureView]) -> Step {

@@ -6,10 +6,10 @@ use super::gpu::{ITERATIONS, UNCONVERGED};
 use super::raster::{GATHERED_BYTES, Textures};
 use super::{compute, raster};
 use crate::camera::{Camera, Projection, View};
-use crate::gpu::{Clock, Gpu, Recorder, read_back, test_gpu};
+use crate::gpu::{Gpu, read_back, test_gpu};
 use crate::project::DeviceCloud;
-use crate::project::gpu::tests::upload_screen;
-use crate::project::gpu::{COUNTERS, Counter};
+use crate::project::gpu::tests::{run_round, upload_screen};
+use crate::project::gpu::{COUNTERS, Counter, Round};
 use crate::project::{ProjectRules, ScreenPoints};
 use crate::search::SearchRules;
 use crate::search::engine::{EnginePasses, SearchBuffers};
@@ -90,9 +90,9 @@ fn by(gpu: &Gpu, passes: &dyn EnginePasses, screen: &ScreenPoints, view: &View, 
     let searched =
         SearchBuffers { frame: &frame, cloud: &cloud, screen: &buffers, neighborhoods: &neighborhoods, past: &past };
     let steps = passes.steps(gpu, searched).expect("steps");
-    let mut recorder = Recorder::new(gpu, &Clock::Off);
-    steps.rounds.iter().flatten().for_each(|step| recorder.run(step));
-    recorder.finish();
+    for (round, steps) in [Round::Active, Round::Recovered].into_iter().zip(&steps.rounds) {
+        run_round(gpu, &buffers, round, steps);
+    }
     let found: Vec<[f32; 12]> = read_back(gpu, &neighborhoods, screen.points.len()).expect("neighbourhoods");
     let counters: Vec<u32> = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");
     let runs: Vec<u32> = read_back(gpu, &steps.convergence.expect("a curve"), 2 * (ITERATIONS + 1)).expect("a curve");

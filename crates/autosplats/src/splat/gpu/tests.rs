@@ -10,7 +10,7 @@ use crate::adapt::Noise;
 use crate::camera::View;
 use crate::fit::Surfel;
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
-use crate::project::gpu::tests::find_work;
+use crate::project::gpu::tests::{find_work, run_round};
 use crate::project::gpu::{COUNTERS, DensityCell};
 use crate::project::{DensityGrid, ScreenPoint};
 use crate::test_clouds::Random;
@@ -90,7 +90,9 @@ impl Scene<'_> {
         };
         let pixels = (screen.size[0] * screen.size[1]) as usize;
         let depth = || read_depth(gpu, screen, pixels);
-        let visibility = |round| run(passes.steps_visibility(gpu, frame, screen, surfels, splats, round));
+        let visibility = |round| {
+            run_round(gpu, screen, round, &passes.steps_visibility(gpu, frame, screen, surfels, splats, round));
+        };
         set_counter(gpu, screen, Counter::Active, self.active);
         visibility(Round::Active);
         set_counter(gpu, screen, Counter::Recovered, self.surfels.len() - self.active);
@@ -391,11 +393,9 @@ fn hidden_points_are_not_recovered() {
     set_counter(&gpu, screen, Counter::Active, 500);
     set_counter(&gpu, screen, Counter::Passive, passive.len());
     let Buffers { frame, screen, surfels: on_device, splats, .. } = &buffers;
-    let mut recorder = Recorder::new(&gpu, &Clock::Off);
-    let visibility = passes.steps_visibility(&gpu, frame, screen, on_device, splats, Round::Active);
-    let recover = passes.steps_recover(&gpu, frame, screen);
-    visibility.iter().chain(&recover).for_each(|step| recorder.run(step));
-    recorder.finish();
+    let mut steps = passes.steps_visibility(&gpu, frame, screen, on_device, splats, Round::Active);
+    steps.extend(passes.steps_recover(&gpu, frame, screen));
+    run_round(&gpu, screen, Round::Active, &steps);
 
     let (splatter, _) = scene.host(Channels::default());
     let seen = |&index: &u32| {
@@ -407,6 +407,8 @@ fn hidden_points_are_not_recovered() {
     assert!(expected.len() > 500 && expected.len() + 500 < passive.len(), "some of each: {}", expected.len());
     let counters: Vec<u32> = read_back(&gpu, &screen.counters, COUNTERS).expect("counters");
     let recovered = counters[Counter::Recovered as usize] as usize;
+    let round = [Counter::Round, Counter::RoundFirst, Counter::RoundLen].map(|counter| counters[counter as usize]);
+    assert_eq!(round, [1, 500, recovered as u32], "the second round begins");
     let queries: Vec<u32> = read_back(&gpu, &screen.queries, 500 + recovered).expect("queries");
     // Depths are random, so rounding decides none.
     assert_eq!(queries[500..], expected, "recovered points, in order");

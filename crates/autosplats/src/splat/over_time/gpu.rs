@@ -55,8 +55,7 @@ impl OverTimeBuffers {
 /// The passes of temporal smoothing.
 #[derive(Debug)]
 pub(crate) struct OverTimePasses {
-    /// For each [`Round`].
-    smooth: [Pass; 2],
+    smooth: Pass,
     clear: Pass,
     keep: Pass,
 }
@@ -67,9 +66,8 @@ impl OverTimePasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        let smooth = |round: Round| Pass::new(gpu, &OVER_TIME, &[round.constant()]);
         Ok(Self {
-            smooth: [smooth(Round::Active)?, smooth(Round::Recovered)?],
+            smooth: Pass::new(gpu, &OVER_TIME, &[])?,
             clear: Pass::new(gpu, &CLEAR_WORDS, &[])?,
             keep: Pass::new(gpu, &KEEP_FITTED, &[])?,
         })
@@ -88,7 +86,7 @@ impl OverTimePasses {
         let ScreenBuffers { counters, points, .. } = screen;
         let OverTimeBuffers { halves, fitted, frames } = buffers;
         let bound = [frame, counters, &layers.surface, points, halves, fitted, surfels, frames];
-        self.smooth[round as usize].step(gpu, &bound, screen.groups(round.work_64()))
+        self.smooth.step(gpu, &bound, screen.groups(round.work_64()))
     }
 
     /// Keeps the surfels of both rounds. Runs after both are averaged.

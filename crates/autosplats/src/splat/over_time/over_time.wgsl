@@ -9,7 +9,6 @@
 #import half
 #import moved
 #import reproject
-#import round
 #import screen
 #import surfel
 
@@ -89,8 +88,8 @@ fn smoothed(place: u32) -> f32 {
 
 @compute @workgroup_size(SMALL_GROUP)
 fn over_time(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let first = select(0u, counters[ACTIVE], ROUND == 1u);
-    let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
+    let first = counters[ROUND_FIRST];
+    let len = counters[ROUND_LEN];
     let index = group_index(workgroup) * SMALL_GROUP + local;
     if index < len {
         frames[first + index] = smoothed(first + index);

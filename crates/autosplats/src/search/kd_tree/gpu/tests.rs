@@ -5,9 +5,9 @@ use autosplats_cloud::glam::DVec3;
 
 use super::*;
 use crate::camera::{Camera, Projection, View};
-use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
+use crate::gpu::{FrameUniform, read_back, test_gpu};
 use crate::points::Points;
-use crate::project::gpu::tests::upload_screen;
+use crate::project::gpu::tests::{run_round, upload_screen};
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{DeviceCloud, ProjectRules, Projector, ScreenPoints, Uploader};
 use crate::search::past::gpu::past_buffer;
@@ -66,9 +66,9 @@ fn find(gpu: &Gpu, passes: &KdTreePasses, positions: &[[f32; 3]], view: &View, k
         neighborhoods: &neighborhoods,
         past: &past,
     };
-    let mut recorder = Recorder::new(gpu, &Clock::Off);
-    passes.steps_in(gpu, buffers, &tree).iter().flatten().for_each(|step| recorder.run(step));
-    recorder.finish();
+    for (round, steps) in [Round::Active, Round::Recovered].into_iter().zip(&passes.steps_in(gpu, buffers, &tree)) {
+        run_round(gpu, &uploaded, round, steps);
+    }
     let queries = screen.active.iter().chain(&screen.passive);
     let counters: Vec<u32> = read_back(gpu, &uploaded.counters, COUNTERS).expect("counters");
     let state: Vec<u32> = read_back(gpu, &tree.state[0], 6).expect("a state");

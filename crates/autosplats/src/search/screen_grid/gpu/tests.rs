@@ -5,8 +5,8 @@ use autosplats_cloud::glam::DVec3;
 
 use super::*;
 use crate::camera::{Camera, PlacedView, Projection, Reprojection, View};
-use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
-use crate::project::gpu::tests::upload_screen;
+use crate::gpu::{FrameUniform, read_back, test_gpu};
+use crate::project::gpu::tests::{run_round, upload_screen};
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::past::Past;
@@ -147,11 +147,9 @@ fn on_device(
     let buffers = upload_screen(gpu, screen, view);
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
     let (frame, past) = frame_buffer_after(gpu, view, rules, radii);
-    let mut recorder = Recorder::new(gpu, &Clock::Off);
     for round in [Round::Active, Round::Recovered] {
-        passes.steps(gpu, &frame, &buffers, &neighborhoods, &past, round).iter().for_each(|step| recorder.run(step));
+        run_round(gpu, &buffers, round, &passes.steps(gpu, &frame, &buffers, &neighborhoods, &past, round));
     }
-    recorder.finish();
     let found: Vec<Neighborhood> = read_back(gpu, &neighborhoods, screen.points.len()).expect("neighbourhoods");
     let counters: Vec<u32> = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");
     let counted = [Counter::Clamped, Counter::Bounded].map(|counter| counters[counter as usize] as usize);

@@ -1,6 +1,5 @@
 // Data shared by all queries of a search's workgroup. The including pass binds `counters` as atomics.
 
-#import round
 #import window
 #import window_points
 
@@ -22,14 +21,13 @@ var<workgroup> task: SearchTask;
 
 // Index of the counter of the queries left.
 fn left_counter() -> u32 {
-    return select(LEFT_ACTIVE, LEFT_RECOVERED, ROUND == 1u);
+    return LEFT_ACTIVE + atomicLoad(&counters[ROUND]);
 }
 
 // To be called by one invocation; a barrier must follow.
 fn task_load() {
-    let active_points = atomicLoad(&counters[ACTIVE]);
-    task.first = select(0u, active_points, ROUND == 1u);
-    task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+    task.first = atomicLoad(&counters[ROUND_FIRST]);
+    task.len = atomicLoad(&counters[ROUND_LEN]);
     task.left = atomicLoad(&counters[left_counter()]);
     task.visible = atomicLoad(&counters[VISIBLE]);
     task.near_first = atomicLoad(&counters[NEAR_FIRST]);

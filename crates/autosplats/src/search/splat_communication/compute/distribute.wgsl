@@ -6,7 +6,6 @@
 #import frame
 #import groups
 #import radius_search
-#import round
 #import screen
 #import shared_boxes
 #import told
@@ -23,8 +22,8 @@ var<workgroup> steps: array<Search, LARGE_GROUP>;
 
 @compute @workgroup_size(LARGE_GROUP)
 fn distribute(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let first = select(0u, counters[ACTIVE], ROUND == 1u) + group_index(workgroup) * LARGE_GROUP;
-    let end = counters[ACTIVE] + select(0u, counters[RECOVERED], ROUND == 1u);
+    let first = counters[ROUND_FIRST] + group_index(workgroup) * LARGE_GROUP;
+    let end = counters[ROUND_FIRST] + counters[ROUND_LEN];
     clear_lines(local);
     if first + local < end {
         let own = queries[first + local];

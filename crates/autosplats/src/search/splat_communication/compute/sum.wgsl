@@ -12,7 +12,6 @@
 #import neighborhood
 #import points_in_box
 #import radius_search
-#import round
 #import screen
 #import told
 
@@ -26,9 +25,8 @@
 
 @compute @workgroup_size(LARGE_GROUP)
 fn sum(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let active_points = atomicLoad(&counters[ACTIVE]);
-    let first = select(0u, active_points, ROUND == 1u);
-    let len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+    let first = atomicLoad(&counters[ROUND_FIRST]);
+    let len = atomicLoad(&counters[ROUND_LEN]);
     let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= len {
         return;

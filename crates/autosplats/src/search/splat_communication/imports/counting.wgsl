@@ -1,7 +1,7 @@
-// Counts a round's queries that have not converged. The including pass binds `arguments` and `convergence`.
+// Counts a round's queries that have not converged. The including pass binds `arguments`, `convergence`, and `counters`
+// for reading.
 
 #import communication
-#import round
 
 var<workgroup> unconverged: atomic<u32>;
 
@@ -17,6 +17,6 @@ fn count_unconverged(is_unconverged: bool, local: u32) {
     workgroupBarrier();
     if local == 0u && atomicLoad(&unconverged) > 0u {
         let curve = arrayLength(&convergence) / 2u;
-        atomicAdd(&convergence[ROUND * curve + arguments.iterations + 1u], atomicLoad(&unconverged));
+        atomicAdd(&convergence[counters[ROUND] * curve + arguments.iterations + 1u], atomicLoad(&unconverged));
     }
 }

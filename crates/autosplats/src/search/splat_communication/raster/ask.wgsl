@@ -4,7 +4,6 @@
 
 #import frame
 #import communication
-#import round
 #import screen
 #import splat_box
 
@@ -14,7 +13,7 @@
 
 @vertex
 fn ask_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
-    let first = select(0u, counters[ACTIVE], ROUND == 1u);
+    let first = counters[ROUND_FIRST];
     let point = points[queries[first + vertex / BOX_VERTICES]];
     return pixel_vertex(pixel_xy(point.pixel), vertex, splat_depth(point.position_view, 0.0));
 }

@@ -5,7 +5,6 @@
 #import frame
 #import groups
 #import neighborhood
-#import round
 #import screen
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
@@ -17,8 +16,8 @@
 
 @compute @workgroup_size(LARGE_GROUP)
 fn keep_covariance(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let first = select(0u, counters[ACTIVE], ROUND == 1u);
-    let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
+    let first = counters[ROUND_FIRST];
+    let len = counters[ROUND_LEN];
     let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= len {
         return;

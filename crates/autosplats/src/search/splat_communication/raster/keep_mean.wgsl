@@ -6,7 +6,6 @@
 #import ending
 #import groups
 #import neighborhood
-#import round
 #import screen
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
@@ -19,9 +18,8 @@
 
 @compute @workgroup_size(LARGE_GROUP)
 fn keep_mean(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let active_points = atomicLoad(&counters[ACTIVE]);
-    let first = select(0u, active_points, ROUND == 1u);
-    let len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+    let first = atomicLoad(&counters[ROUND_FIRST]);
+    let len = atomicLoad(&counters[ROUND_LEN]);
     let index = group_index(workgroup) * LARGE_GROUP + local;
     if index >= len {
         return;
