@@ -144,6 +144,19 @@ fn on_device(
     rules: &SearchRules,
     radii: Option<&[f32]>,
 ) -> (Vec<Moments>, [usize; 2]) {
+    let (found, counters) = counted_on_device(gpu, passes, screen, view, rules, radii);
+    (found, [Counter::Clamped, Counter::Bounded].map(|counter| counters[counter as usize] as usize))
+}
+
+/// Searches both rounds on the device. Returns the neighbourhoods and all counters.
+fn counted_on_device(
+    gpu: &Gpu,
+    passes: &SearchPasses,
+    screen: &ScreenPoints,
+    view: &View,
+    rules: &SearchRules,
+    radii: Option<&[f32]>,
+) -> (Vec<Moments>, Vec<u32>) {
     let buffers = upload_screen(gpu, screen, view);
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
     let (frame, past) = frame_buffer_after(gpu, view, rules, radii);
@@ -151,9 +164,8 @@ fn on_device(
         run_round(gpu, &buffers, round, &passes.steps(gpu, &frame, &buffers, &neighborhoods, &past, round));
     }
     let found: Vec<Neighborhood> = read_back(gpu, &neighborhoods, screen.points.len()).expect("neighbourhoods");
-    let counters: Vec<u32> = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");
-    let counted = [Counter::Clamped, Counter::Bounded].map(|counter| counters[counter as usize] as usize);
-    (found.into_iter().map(Moments::of_device).collect(), counted)
+    let counters = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");
+    (found.into_iter().map(Moments::of_device).collect(), counters)
 }
 
 pub(crate) fn on_host(screen: &ScreenPoints, view: &View, rules: &SearchRules) -> (Vec<Moments>, [usize; 2]) {
@@ -396,4 +408,36 @@ fn the_past_changes_nothing() {
             }
         }
     }
+}
+
+/// Workgroups sum in the order of single invocations. Some queries are left to them, most are not.
+#[test]
+fn one_and_many_give_the_same_bits() {
+    let Some(gpu) = test_gpu() else { return };
+    let (mut searched, mut left) = (0, 0);
+    for k in [1, 10] {
+        let forms = [Form::One, Form::OneOrMany].map(|form| SearchPasses::with_form(&gpu, k, form).expect("passes"));
+        for camera in cameras() {
+            let sized = |size| test_clouds::all(10_000).into_iter().map(move |(name, cloud)| (name, cloud, size));
+            for (name, positions, size) in [[121, 90], [40, 300]].into_iter().flat_map(sized) {
+                let (screen, view) = screen(&positions, &camera, size, k);
+                for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
+                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, lenient: true };
+                    let [one, many] = forms.each_ref().map(|form| {
+                        let (found, mut counters) = counted_on_device(&gpu, form, &screen, &view, &rules, None);
+                        let given = [Counter::LeftActive, Counter::LeftRecovered]
+                            .map(|counter| std::mem::take(&mut counters[counter as usize]));
+                        let bits = |moments: Moments| moments.to_device().map(f32::to_bits);
+                        (found.into_iter().map(bits).collect::<Vec<_>>(), counters, given)
+                    });
+                    let case = format!("{name}, {size:?}, {:?}, {rules:?}", camera.projection);
+                    assert!(one.0 == many.0, "{case}: neighbourhoods");
+                    assert_eq!(one.1, many.1, "{case}: counters");
+                    searched += many.0.len() as u32;
+                    left += many.2.iter().sum::<u32>();
+                }
+            }
+        }
+    }
+    assert!(100 < left && left < searched / 2, "{left} of {searched} queries are left to workgroups");
 }
