@@ -55,7 +55,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     lacks_ball = is_row(surfel, known.noise);
     if !lacks_ball {
         let own_radius = own_radius_of(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
-        out = adapted(surfel, known, own_radius);
+        out = ended(moved_to_surface(surfel, known, own_radius), own_radius);
     }
     if lacks_ball {
         leave(place);

@@ -41,14 +41,9 @@ var<workgroup> task: Task;
 var<workgroup> shared_surfel: Surfel;
 
 // A surfel of a scan line, turned to its area or thin.
-fn turned_row(surfel: Surfel, own_radius: f32) -> Surfel {
+fn turned_row(surfel: Surfel, own_radius: f32) -> Adapted {
     let area = area(surfel, base_radius(surfel, own_radius));
-    var out = turned(surfel, area);
-    if area.radius == 0.0 {
-        out.radius = shrunk(out, own_radius);
-    }
-    out.radius = opened(out, own_radius, 0.0);
-    return out;
+    return Adapted(turned(surfel, area), 0.0, area.radius > 0.0);
 }
 
 @compute @workgroup_size(TOGETHER)
@@ -74,12 +69,13 @@ fn fit_balls(
         let surfel = workgroupUniformLoad(&shared_surfel);
         let known = known_of(surfel);
         let own_radius = own_radius_of(surfel, all.cell_px, all.cell_columns);
-        var out = surfel;
+        var adapted: Adapted;
         if is_row(surfel, known.noise) {
-            out = turned_row(surfel, own_radius);
+            adapted = turned_row(surfel, own_radius);
         } else {
-            out = adapted(surfel, known, own_radius);
+            adapted = moved_to_surface(surfel, known, own_radius);
         }
+        let out = ended(adapted, own_radius);
         if local == 0u {
             surfels[place] = out;
             if is_dropped(out) && !is_dropped(surfel) {

@@ -113,8 +113,6 @@ pub(crate) const SIZES: &[(&str, usize)] = &[("Splat", SPLAT_BYTES)];
 pub(crate) struct LayerRules<'a> {
     /// Refine the depth map twice first [Paper, §7].
     pub(crate) depth_refinement: bool,
-    /// Trim the layers in the end.
-    pub(crate) trim: bool,
     /// [`FrameStatistics`] with the noise; `None` if it is not measured.
     pub(crate) noise: Option<&'a wgpu::Buffer>,
 }
@@ -167,19 +165,20 @@ pub(crate) struct SplatPasses {
     redraw: Pass,
     attributes: Pass,
     sum_blocks: Pass,
-    /// The pass that only counts covered pixels, and the pass that trims too.
-    trim: [Pass; 2],
+    /// Counts covered pixels, and trims if `trims`.
+    trim: Pass,
+    trims: bool,
     /// Linear value of each 8-bit step of a colour.
     linear: wgpu::Buffer,
 }
 
 impl SplatPasses {
-    /// Compiles the passes for splats that carry `channels`; `linear` has the linear value of each 8-bit step of a
+    /// Compiles the passes for splats that carry `channels`, with or without trimming; `linear` has the linear value of each 8-bit step of a
     /// colour.
     ///
     /// # Errors
     /// [`Error::Device`], [`Error::DeviceMemory`].
-    pub(crate) fn new(gpu: &Gpu, channels: Channels, linear: &[f32; 256]) -> Result<Self, Error> {
+    pub(crate) fn new(gpu: &Gpu, channels: Channels, trims: bool, linear: &[f32; 256]) -> Result<Self, Error> {
         let pass = |source| Pass::new(gpu, source, &[]);
         let groups = drawing_constant(gpu);
         let Channels { color, scalar, measures, backs } = channels;
@@ -194,7 +193,6 @@ impl SplatPasses {
             ("MEASURE_SLOTS", slots(measures)),
             ("BACK_SLOTS", slots(backs)),
         ];
-        let trim = |trims: f64| Pass::new(gpu, &TRIM, &[("TRIMS", trims)]);
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
         Ok(Self {
@@ -208,7 +206,8 @@ impl SplatPasses {
             redraw: Pass::new(gpu, &REDRAW, &[groups])?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
             sum_blocks: pass(&SUM_BLOCKS)?,
-            trim: [trim(0.0)?, trim(1.0)?],
+            trim: Pass::new(gpu, &TRIM, &[("TRIMS", trims.into())])?,
+            trims,
             linear: steps,
         })
     }
@@ -260,7 +259,7 @@ impl SplatPasses {
         [self.recover_count.step(gpu, &count, blocks()), self.recover.step(gpu, &recover, blocks())]
     }
 
-    /// Draws the attributes of all rounds' surfels and trims them, by `rules`.
+    /// Draws the attributes of all rounds' surfels, by `rules`, and trims them.
     #[allow(clippy::too_many_arguments, reason = "each is a buffer or a set of them")]
     pub(crate) fn steps_layers(
         &self,
@@ -283,13 +282,12 @@ impl SplatPasses {
         let attributes = [frame, &self.linear, list, tree, surfels, values, depth, surface, cover, extras];
         steps.push(self.attributes.step(gpu, &attributes, patches(screen, PATCH)));
         let noise = rules.noise.unwrap_or(no_noise);
-        if rules.trim {
+        if self.trims {
             let blocks = [frame, cover, sixteenths, noise, summed];
             steps.push(self.sum_blocks.step(gpu, &blocks, block_count(screen.size).div_ceil(SMALL_GROUP)));
         }
         let trim = [frame, surface, cover, extras, counters, centers, sixteenths, noise, summed];
-        let pass = &self.trim[usize::from(rules.trim)];
-        steps.push(pass.step(gpu, &trim, patches(screen, [SQUARE; 2])));
+        steps.push(self.trim.step(gpu, &trim, patches(screen, [SQUARE; 2])));
         steps
     }
 }

@@ -170,15 +170,20 @@ fn opened(surfel: Surfel, own_radius: f32, noise: f32) -> f32 {
     return surfel.radius;
 }
 
-// A surfel, not on a scan line, adapted to what is known of it.
-fn adapted(fitted: Surfel, known: KnownNoise, own_radius: f32) -> Surfel {
+// A surfel that has been adapted to noise or its scan line.
+struct Adapted {
+    surfel: Surfel,
+    // Scatter of its points, world units.
+    noise: f32,
+    // Whether a surface was found, so that it is no outlier.
+    has_surface: bool,
+}
+
+// A surfel, not on a scan line, moved onto the surface beside it if it is noisy.
+fn moved_to_surface(fitted: Surfel, known: KnownNoise, own_radius: f32) -> Adapted {
     var surfel = fitted;
     // A line has no width to draw.
     surfel.major_ratio = select(min(surfel.major_ratio, frame.longest), 1.0, is_line(surfel));
-    if is_near(surfel) {
-        // Cells lack the neighbours of near points.
-        return surfel;
-    }
     let noise = max(known.noise, noise_at(statistics.noise, surfel.k_radius));
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
     let is_noisy = calls(surfel, noise, enough);
@@ -198,9 +203,20 @@ fn adapted(fitted: Surfel, known: KnownNoise, own_radius: f32) -> Surfel {
             surfel.radius *= min(MAX_K_RADIUS_FIRST_RADII * own_radius / surfel.k_radius, 1.0);
         }
         surfel = moved_onto(surfel, surface, noise, known);
-    } else if !is_dropped(surfel) {
+    }
+    return Adapted(surfel, select(0.0, noise, is_noisy), surface.weight > 0.0);
+}
+
+// The surfel, shrunk where it is no surface. Once for all surfels, because devices inline each call.
+fn ended(adapted: Adapted, own_radius: f32) -> Surfel {
+    var surfel = adapted.surfel;
+    // Cells lack the neighbours of near points.
+    if is_near(surfel) {
+        return surfel;
+    }
+    if !adapted.has_surface && !is_dropped(surfel) {
         surfel.radius = shrunk(surfel, own_radius);
     }
-    surfel.radius = opened(surfel, own_radius, select(0.0, noise, is_noisy));
+    surfel.radius = opened(surfel, own_radius, adapted.noise);
     return surfel;
 }

@@ -45,7 +45,7 @@ pub(super) struct Passes {
     adapt: Option<AdaptPasses>,
     /// Compiled for the first smoothed frame.
     over_time: Option<(OverTimePasses, PictureOverTimePasses)>,
-    splat: Option<(Channels, SplatPasses)>,
+    splat: Option<((Channels, bool), SplatPasses)>,
     shade: ShadePasses,
 }
 
@@ -76,7 +76,7 @@ impl Passes {
     fn compile(&mut self, gpu: &Gpu, shape: &Shape, settings: &Settings) -> Result<(), Error> {
         let Reconstruction { engine, k, .. } = settings.reconstruction;
         let searches = self.search.as_ref().is_some_and(|(of, _)| *of == shape.search);
-        let splats = self.splat.as_ref().is_some_and(|(channels, _)| *channels == shape.channels);
+        let splats = self.splat.as_ref().is_some_and(|(of, _)| *of == (shape.channels, shape.trim));
         let adapts = self.adapt.is_some() || !shape.adapt;
         let orients = self.orient.is_some() || shape.sensors.is_none();
         let averages = self.over_time.is_some() || !shape.average;
@@ -88,14 +88,14 @@ impl Passes {
             || join(|| unless(searches, || compile(gpu, engine, k)), || unless(adapts, || AdaptPasses::new(gpu))),
             || {
                 join(
-                    || unless(splats, || SplatPasses::new(gpu, shape.channels, &linear_steps())),
+                    || unless(splats, || SplatPasses::new(gpu, shape.channels, shape.trim, &linear_steps())),
                     || join(|| unless(orients, || OrientPasses::new(gpu)), || unless(averages, over_time)),
                 )
             },
         );
         self.search = search?.map(|passes| (shape.search, passes)).or(self.search.take());
         self.adapt = adapt?.or(self.adapt.take());
-        self.splat = splat?.map(|passes| (shape.channels, passes)).or(self.splat.take());
+        self.splat = splat?.map(|passes| ((shape.channels, shape.trim), passes)).or(self.splat.take());
         self.orient = orient?.or(self.orient.take());
         self.over_time = over_time?.or(self.over_time.take());
         gpu.store_pipelines();
@@ -273,7 +273,7 @@ impl Prepared {
                     }
                     Stage::Layers => {
                         let noise = adapt.as_ref().map(|(_, buffers)| buffers.noise());
-                        let rules = LayerRules { depth_refinement: shape.depth_refinement, trim: shape.trim, noise };
+                        let rules = LayerRules { depth_refinement: shape.depth_refinement, noise };
                         steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, rules));
                     }
                     Stage::Shade => {

@@ -100,7 +100,7 @@ impl Scene<'_> {
         let before = depth();
         let statistics = FrameStatistics { noise: self.noise, k_radius: 0.0, sheet_level: 0 };
         let noise = gpu.storage_with("noise", &[statistics]).expect("room");
-        let rules = LayerRules { depth_refinement: self.refinement, trim: true, noise: Some(&noise) };
+        let rules = LayerRules { depth_refinement: self.refinement, noise: Some(&noise) };
         run(passes.steps_layers(gpu, frame, screen, surfels, splats, layers, rules));
         Drawn { depth: [before, depth()], layers: read_layers(gpu, layers) }
     }
@@ -213,7 +213,7 @@ fn assert_same(gpu: &Gpu, passes: &SplatPasses, scene: &Scene<'_>, case: &str) {
 fn the_device_draws_what_the_host_draws() {
     let Some(gpu) = test_gpu() else { return };
     let data = Data::new(2000);
-    let passes = SplatPasses::new(&gpu, ALL, &data.linear).expect("passes");
+    let passes = SplatPasses::new(&gpu, ALL, true, &data.linear).expect("passes");
     for size in SIZES {
         for view in views(size) {
             for discs in ALL_DISCS {
@@ -262,7 +262,7 @@ fn blurred_disc(count: u32, away_px: f32, noise_px: f32, tilt: f32, view: &View)
 fn the_device_ends_blurred_borders_where_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
     let data = Data::new(40_000);
-    let passes = SplatPasses::new(&gpu, ALL, &data.linear).expect("passes");
+    let passes = SplatPasses::new(&gpu, ALL, true, &data.linear).expect("passes");
     let (small, large) = (([233, 190], 16_000, 70.0), ([411, 390], 40_000, 120.0));
     for ((size, count, away_px), noise_px, power, tilt) in [
         (small, 0.1, 0.0, 0.8),
@@ -310,7 +310,7 @@ fn the_device_ends_blurred_borders_where_the_host_does() {
 fn many_splats_and_none() {
     let Some(gpu) = test_gpu() else { return };
     let data = Data::new(300_000);
-    let passes = SplatPasses::new(&gpu, ALL, &data.linear).expect("passes");
+    let passes = SplatPasses::new(&gpu, ALL, true, &data.linear).expect("passes");
     let view = views([150, 90])[0];
     // More than the root's first 64 children hold, so that lists are filled more than once.
     for (count, discs) in [(0, Discs::Small), (64, Discs::Surface), (270_000, Discs::Small)] {
@@ -343,7 +343,7 @@ fn layers_that_are_not_wanted_change_no_other() {
     for bits in 0..16 {
         let [color, scalar, measures, backs] = [1, 2, 4, 8].map(|bit| bits & bit != 0);
         let channels = Channels { color, scalar, measures, backs };
-        let passes = SplatPasses::new(&gpu, channels, &data.linear).expect("passes");
+        let passes = SplatPasses::new(&gpu, channels, true, &data.linear).expect("passes");
         let drawn = scene.device(&gpu, &passes, channels);
         assert_few(&gpu, other_layers(&drawn.layers, &scene.host(channels).1), 71 * 50, &format!("{channels:?}"));
         let again = scene.device(&gpu, &passes, channels);
@@ -365,7 +365,7 @@ fn layers_that_are_not_wanted_change_no_other() {
 fn hidden_points_are_not_recovered() {
     let Some(gpu) = test_gpu() else { return };
     let data = Data::new(5000);
-    let passes = SplatPasses::new(&gpu, Channels::default(), &data.linear).expect("passes");
+    let passes = SplatPasses::new(&gpu, Channels::default(), true, &data.linear).expect("passes");
     let view = views([133, 90])[0];
     let surfels = surfels(45, 500, Discs::Circles, &view);
     let scene =
