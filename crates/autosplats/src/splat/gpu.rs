@@ -173,8 +173,8 @@ pub(crate) struct SplatPasses {
 }
 
 impl SplatPasses {
-    /// Compiles the passes for splats that carry `channels`, with or without trimming; `linear` has the linear value of each 8-bit step of a
-    /// colour.
+    /// Compiles the passes for splats that carry `channels`, with or without trimming; `linear` has the linear value of
+    /// each 8-bit step of a colour.
     ///
     /// # Errors
     /// [`Error::Device`], [`Error::DeviceMemory`].
