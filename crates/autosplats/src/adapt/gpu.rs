@@ -96,8 +96,8 @@ const TOGETHER: [u32; 2] = [32, 8];
 /// Cells with sheets of a workgroup, at most 32, on hardware and on a software device. Small groups keep a GPU evenly
 /// busy. A software device pays more for a workgroup than for most cells.
 const CELLS_PER_GROUP: [u32; 2] = [4, 16];
-/// Surfels whose balls a workgroup fits one after the other, as far as there are workgroups for all. Software ends all
-/// loops of an invocation after 65535 rounds in sum, so it takes not too many.
+/// Surfels whose balls a workgroup fits one after the other, as far as there are workgroups for all. More of them would
+/// bring software to its end of all loops of an invocation, after 65535 rounds in sum.
 const SURFELS_PER_GROUP: [u32; 2] = [1, 16];
 /// Clusters of a cell that are stored side by side.
 const BUNCH: usize = 4;
