@@ -1,5 +1,5 @@
 // Balls that the invocations of a workgroup sum up together: for the few that take long. All invocations ask for the
-// same ball, in uniform control flow, and get the same sums. Alternative: `alone`.
+// same ball, in uniform control flow, and get the same sums.
 
 #import quadric
 
