@@ -61,8 +61,5 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         leave(place);
         return;
     }
-    surfels[place] = out;
-    if is_dropped(out) && !is_dropped(surfel) {
-        atomicAdd(&counters[OUTLIERS], 1u);
-    }
+    keep_adapted(place, surfel, out);
 }

@@ -5,15 +5,11 @@
 // Reads: density, levels, clusters, statistics, sheets, depth_noise, left. Reads and writes: counters, surfels.
 
 #import frame
-#import adapted
-#import balls
-#import base_radius
-#import calls
 #import density
 #import depth_noise
 #import levels
 #import noise
-#import rows
+#import own_balls
 #import sheet
 #import surfel
 #import together
@@ -40,12 +36,6 @@ var<workgroup> task: Task;
 // The surfel being adapted.
 var<workgroup> shared_surfel: Surfel;
 
-// A surfel of a scan line, turned to its area or thin.
-fn turned_row(surfel: Surfel, own_radius: f32) -> Adapted {
-    let area = area(surfel, base_radius(surfel, own_radius));
-    return Adapted(turned(surfel, area), 0.0, area.radius > 0.0);
-}
-
 @compute @workgroup_size(TOGETHER)
 fn fit_balls(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -67,20 +57,9 @@ fn fit_balls(
             shared_surfel = surfels[place];
         }
         let surfel = workgroupUniformLoad(&shared_surfel);
-        let known = known_of(surfel);
-        let own_radius = own_radius_of(surfel, all.cell_px, all.cell_columns);
-        var adapted: Adapted;
-        if is_row(surfel, known.noise) {
-            adapted = turned_row(surfel, own_radius);
-        } else {
-            adapted = moved_to_surface(surfel, known, own_radius);
-        }
-        let out = ended(adapted, own_radius);
+        let out = adapted_by_balls(surfel, all.cell_px, all.cell_columns);
         if local == 0u {
-            surfels[place] = out;
-            if is_dropped(out) && !is_dropped(surfel) {
-                atomicAdd(&counters[OUTLIERS], 1u);
-            }
+            keep_adapted(place, surfel, out);
         }
     }
 }

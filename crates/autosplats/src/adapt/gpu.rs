@@ -14,9 +14,12 @@ use crate::project::gpu::{Counter, Round, ScreenBuffers};
 const LIBRARY: Library = Library {
     files: &[files![
         "adapted",
+        "alone",
+        "ball_scatter",
         "balls",
         "base_radius",
         "calls",
+        "cell_sheets",
         "choose",
         "clusters",
         "depth_noise",
@@ -25,11 +28,13 @@ const LIBRARY: Library = Library {
         "layout",
         "levels",
         "merging",
+        "own_balls",
         "quadric",
         "quantiles",
         "rows",
         "scatters",
         "sheet",
+        "sorted_sample",
         "surface",
         "through",
         "together",
@@ -72,7 +77,7 @@ const LIBRARY: Library = Library {
             CELLS_TO_COUNT, LEAST_ON, MAX_SURFACE_MEAN_RADII, MAX_SURFACE_VARIATION, MIN_SURFACE_WIDTH_RATIO,
             MIN_TESTED_FIRST_RADII, ON_DISC, ON_DISC_NOISE, SURFACE_BALL_K_RADII
         ),
-        constants![BUNCH, SAMPLE_PARTS, TILE],
+        constants![BUNCH, SAMPLE_PARTS, TILE, TOGETHER],
     ],
 };
 
@@ -81,24 +86,31 @@ passes! {
     FILL = "fill",
     MERGE = "merge",
     PICK = "pick",
-    SAMPLE_PASS = "sample",
     SCATTERS = "scatter",
+    SCATTERS_ALONE = "scatter_alone",
     QUANTILES = "quantile",
     NOISE = "noise",
     ASK = "ask",
     FIT_SHEETS = "fit_sheets",
+    FIT_SHEETS_ALONE = "fit_sheets_alone",
     ADAPT = "adapt",
     FIT_BALLS = "fit_balls",
+    FIT_BALLS_ALONE = "fit_balls_alone",
 }
 
-/// Invocations that sum up a ball together, on hardware and on a software device, which runs eight side by side.
-const TOGETHER: [u32; 2] = [32, 8];
-/// Cells with sheets of a workgroup, at most 32, on hardware and on a software device. Small groups keep a GPU evenly
-/// busy. A software device pays more for a workgroup than for most cells.
-const CELLS_PER_GROUP: [u32; 2] = [4, 16];
-/// Surfels whose balls a workgroup fits one after the other, as far as there are workgroups for all. More of them would
-/// bring software to its end of all loops of an invocation, after 65535 rounds in sum.
-const SURFELS_PER_GROUP: [u32; 2] = [1, 16];
+/// Invocations that sum up a ball together, on hardware. On software each sums up balls of its own.
+const TOGETHER: u32 = 32;
+/// Surfels of the sample that a workgroup sorts, on hardware and on software.
+const SORTED_PER_GROUP: [u32; 2] = [TOGETHER, SMALL_GROUP];
+/// Balls of the sample, cells with sheets and listed surfels of a workgroup, on hardware and on software. On hardware
+/// it takes one after the other: small numbers keep a GPU evenly busy. Cells are at most 32 there, the bits of a mask.
+const BALLS_PER_GROUP: [u32; 2] = [1, SMALL_GROUP];
+const CELLS_PER_GROUP: [u32; 2] = [4, SMALL_GROUP];
+const SURFELS_PER_GROUP: [u32; 2] = [1, SMALL_GROUP];
+/// Ball sizes that are measured at first, the others only where these do not tell the noise; on hardware and on
+/// software. A size is judged by the next. Software saves the work. Hardware would wait longer for more dispatches.
+const FIRST_SCALES: [usize; 2] = [SCALES, 2];
+const _: () = assert!(MOST_SAMPLED as u32 % SMALL_GROUP == 0, "workgroups of the sample are full");
 /// Clusters of a cell that are stored side by side.
 const BUNCH: usize = 4;
 /// Parts of the sample that have quantiles: its densest third, its sparsest third, all, and all by steady shares.
@@ -136,7 +148,8 @@ pub(crate) struct Asked {
 #[derive(Debug)]
 pub(crate) struct AdaptBuffers {
     levels: wgpu::Buffer,
-    /// Workgroups that fit sheets, and those that fit the balls of each round, three `u32` each.
+    /// Workgroups that fit sheets, those that fit the balls of each round, those that measure the larger balls of the
+    /// sample and those that find their quantiles, three `u32` each.
     arguments: wgpu::Buffer,
     /// Most tiles of each level.
     tiles: [u32; MOST_LEVELS],
@@ -144,7 +157,8 @@ pub(crate) struct AdaptBuffers {
     /// [`Asked`] per cell.
     asked: wgpu::Buffer,
     sheets: wgpu::Buffer,
-    /// Indices of the sampled surfels, then their number. `picked` is unordered, `sampled` is sorted by k-radius.
+    /// Indices of the sampled surfels, then their number. `picked` is unordered, `sampled` is sorted by k-radius. What
+    /// is behind: `imports/scatters.wgsl`.
     picked: wgpu::Buffer,
     sampled: wgpu::Buffer,
     scatters: wgpu::Buffer,
@@ -172,15 +186,15 @@ impl AdaptBuffers {
             )?,
             arguments: gpu.buffer(
                 "arguments of sheets and balls",
-                3 * DISPATCH_BYTES,
+                5 * DISPATCH_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
             tiles: std::array::from_fn(|level| most_tiles(size, most_finest, level)),
             clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size, most_finest))?,
             asked: gpu.storage::<Asked>("surfels that ask for sheets", sheet_cells)?,
             sheets: gpu.storage::<[Sheet; SHEETS]>("sheets", sheet_cells)?,
-            picked: gpu.storage::<u32>("picked surfels", MOST_SAMPLED + 1)?,
-            sampled: gpu.storage::<u32>("sampled surfels", MOST_SAMPLED + 1)?,
+            picked: gpu.storage::<u32>("picked surfels", MOST_SAMPLED + 2)?,
+            sampled: gpu.storage::<u32>("sampled surfels", 2 * MOST_SAMPLED + 1)?,
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * MOST_SAMPLED)?,
             quantiles: gpu.storage::<Quantile>("quantiles of scatter", SAMPLE_PARTS * SCALES + STEADY_SCALES)?,
             statistics: gpu.storage::<FrameStatistics>("statistics of surfels", 1)?,
@@ -264,8 +278,10 @@ pub(crate) struct AdaptPasses {
     /// Levels that a dispatch fills first, and a uniform with each.
     firsts: Vec<(usize, wgpu::Buffer)>,
     pick: Pass,
-    sample: Pass,
     scatter: Pass,
+    /// Workgroups of `scatter` for the sizes that are measured at first, and whether there are others.
+    scatters: u32,
+    in_parts: bool,
     quantile: Pass,
     noise: Pass,
     fit_sheets: Pass,
@@ -286,7 +302,6 @@ impl AdaptPasses {
     /// Compiles the passes that suit hardware or software.
     fn for_kind(gpu: &Gpu, software: bool) -> Result<Self, Error> {
         let kind = usize::from(software);
-        let together = ("TOGETHER", TOGETHER[kind].into());
         let coarser = ("COARSER", COARSER[kind] as f64);
         let first = |level: usize| {
             let told = gpu.uniform::<u32>("first level")?;
@@ -294,23 +309,41 @@ impl AdaptPasses {
             Ok::<_, Error>((level, told))
         };
         let step = COARSER[kind] + 1;
-        let cells = ("CELLS_PER_GROUP", CELLS_PER_GROUP[kind].into());
+        let cells = &[("CELLS_PER_GROUP", CELLS_PER_GROUP[kind].into())][..];
+        let balls = ("BALLS_PER_GROUP", BALLS_PER_GROUP[kind].into());
+        let first_scales = ("FIRST_SCALES", FIRST_SCALES[kind] as f64);
         let surfels = ("SURFELS_PER_GROUP", SURFELS_PER_GROUP[kind].into());
-        let pass = |source| Pass::new(gpu, source, &[]);
         let most_finest = ("MOST_FINEST", most_finest(gpu.most_bound()) as f64);
+        let [fit_balls, adapt, fit_sheets, scatter, fill, merge, pick, quantile, noise, ask] = Pass::all(
+            gpu,
+            [
+                (if software { &FIT_BALLS_ALONE } else { &FIT_BALLS }, &[]),
+                (&ADAPT, &[surfels]),
+                if software { (&FIT_SHEETS_ALONE, &[]) } else { (&FIT_SHEETS, cells) },
+                (if software { &SCATTERS_ALONE } else { &SCATTERS }, &[]),
+                (&FILL, &[most_finest, coarser]),
+                (&MERGE, &[coarser]),
+                (&PICK, &[]),
+                (&QUANTILES, &[first_scales]),
+                (&NOISE, &[cells[0], first_scales, balls]),
+                (&ASK, &[]),
+            ],
+        )?;
         Ok(Self {
-            fill: Pass::new(gpu, &FILL, &[most_finest, coarser])?,
-            merge: Pass::new(gpu, &MERGE, &[coarser])?,
+            fill,
+            merge,
             firsts: (step..MOST_LEVELS).step_by(step).map(first).collect::<Result<_, _>>()?,
-            pick: pass(&PICK)?,
-            sample: pass(&SAMPLE_PASS)?,
-            scatter: Pass::new(gpu, &SCATTERS, &[together])?,
-            quantile: pass(&QUANTILES)?,
-            noise: Pass::new(gpu, &NOISE, &[cells])?,
-            fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[together, cells])?,
-            ask: pass(&ASK)?,
-            adapt: Pass::new(gpu, &ADAPT, &[surfels])?,
-            fit_balls: Pass::new(gpu, &FIT_BALLS, &[together])?,
+            pick,
+            scatter,
+            scatters: MOST_SAMPLED as u32 / SORTED_PER_GROUP[kind]
+                + (FIRST_SCALES[kind] * MOST_SAMPLED) as u32 / BALLS_PER_GROUP[kind],
+            in_parts: FIRST_SCALES[kind] < SCALES,
+            quantile,
+            noise,
+            fit_sheets,
+            ask,
+            adapt,
+            fit_balls,
         })
     }
 
@@ -347,15 +380,22 @@ impl AdaptPasses {
         let AdaptBuffers { picked, sampled, scatters, quantiles, statistics, depth_noise, .. } = buffers;
         let mut steps = Vec::new();
         if round == Round::Active {
-            let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
-            let noise = [frame, surfels, sampled, quantiles, statistics, levels, depth_noise, arguments];
+            let balls = [frame, counters, density, surfels, levels, clusters, picked, scatters, sampled];
+            let quantile = [frame, sampled, scatters, quantiles, picked];
+            let noise = [frame, surfels, sampled, quantiles, statistics, levels, depth_noise, arguments, picked];
             steps.extend([
                 self.pick.step(gpu, &[frame, counters, surfels, picked], screen.groups(round.work_64())),
-                self.sample.step(gpu, &[surfels, picked, sampled], (MOST_SAMPLED as u32).div_ceil(SMALL_GROUP)),
-                self.scatter.step(gpu, &balls, (SCALES * MOST_SAMPLED) as u32),
-                self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], (SAMPLE_PARTS * SCALES) as u32),
+                self.scatter.step(gpu, &balls, self.scatters),
+                self.quantile.step(gpu, &quantile, (SAMPLE_PARTS * SCALES) as u32),
                 self.noise.step(gpu, &noise, 1),
             ]);
+            if self.in_parts {
+                steps.extend([
+                    self.scatter.step(gpu, &balls, Groups::Counted(arguments.clone(), 3 * DISPATCH_BYTES)),
+                    self.quantile.step(gpu, &quantile, Groups::Counted(arguments.clone(), 4 * DISPATCH_BYTES)),
+                    self.noise.step(gpu, &noise, 1),
+                ]);
+            }
         }
         let ask = [frame, counters, levels, statistics, surfels, depth_noise, asked];
         let fit = [frame, levels, clusters, statistics, asked, depth_noise, sheets];

@@ -1,5 +1,5 @@
 // Fills the levels of cells that are too coarse for the tiles of the last dispatch: again a workgroup per tile, of the
-// first of these levels. Resets the number of picked surfels.
+// first of these levels. Resets the numbers of picked surfels and of measured sizes.
 //
 // Reads: levels, first. Reads and writes: clusters. Writes: picked.
 
@@ -7,6 +7,7 @@
 #import groups
 #import levels
 #import merging
+#import scatters
 
 @group(0) @binding(1) var<storage, read> levels: array<Level>;
 @group(0) @binding(2) var<storage, read_write> clusters: array<vec4f>;
@@ -19,6 +20,7 @@ fn merge(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let group = group_index(workgroup);
     if group == 0u && local == 0u {
         picked[MOST_SAMPLED] = 0u;
+        picked[MEASURED] = 0u;
     }
     if local < MOST_LEVELS {
         all_levels[local] = levels[local];

@@ -1,7 +1,9 @@
 // The noise level: how far points scatter about the surface. See the CPU form. Counts the workgroups that fit sheets:
-// none where nothing is noisy. Those that fit balls are counted by `adapt`. One invocation.
+// none where nothing is noisy. Those that fit balls are counted by `adapt`. Where the ball sizes that are measured at
+// first do not tell the noise, counts those that measure the others instead, and tells when it is run again. One
+// invocation.
 //
-// Reads: surfels, sampled, quantiles, levels, depth_noise. Writes: statistics, arguments.
+// Reads: surfels, sampled, quantiles, levels, depth_noise. Reads and writes: picked. Writes: statistics, arguments.
 
 #import frame
 #import depth_noise
@@ -9,6 +11,7 @@
 #import noise
 #import put_work
 #import quantiles
+#import scatters
 #import surfel
 
 @group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
@@ -18,9 +21,26 @@
 @group(0) @binding(5) var<storage, read> levels: array<Level>;
 @group(0) @binding(6) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(7) var<storage, read_write> arguments: array<Dispatch>;
+@group(0) @binding(8) var<storage, read_write> picked: array<u32>;
 
 // Cells of a workgroup that fits sheets.
 override CELLS_PER_GROUP: u32;
+// Number of ball sizes that are measured at first, and balls of a workgroup that measures.
+override FIRST_SCALES: u32;
+override BALLS_PER_GROUP: u32;
+// Places of the arguments of the passes that measure the other sizes.
+const SCATTER_ARGUMENTS = 3u;
+const QUANTILE_ARGUMENTS = 4u;
+
+// Whether a part's balls tell the noise up to a size, which is known by the next.
+fn tells_noise(part: u32, measured: u32) -> bool {
+    for (var scale = 0u; scale + 1u < measured; scale++) {
+        if quantiles[part * SCALES + scale].kind == OF_THIN_BALLS {
+            return true;
+        }
+    }
+    return false;
+}
 
 // Noise level of a part of the sample with about the same density; 0 if the part is too small.
 fn scatter_level(part: u32) -> f32 {
@@ -103,6 +123,15 @@ fn any_known() -> bool {
 
 @compute @workgroup_size(1)
 fn noise() {
+    let measured = select(FIRST_SCALES, SCALES, picked[MEASURED] > 0u);
+    let goes_on = measured < SCALES
+        && !(tells_noise(DENSEST, measured) && tells_noise(SPARSEST, measured) && tells_noise(ALL, measured));
+    put_work(SCATTER_ARGUMENTS, select(0u, (SCALES - measured) * MOST_SAMPLED, goes_on), BALLS_PER_GROUP);
+    put_groups(QUANTILE_ARGUMENTS, select(0u, SAMPLE_PARTS * SCALES, goes_on));
+    if goes_on {
+        picked[MEASURED] = measured;
+        return;
+    }
     let found = noise_of_sample();
     let len = sampled[MOST_SAMPLED];
     var middle = 0.0;

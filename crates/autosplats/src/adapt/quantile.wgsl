@@ -1,8 +1,8 @@
 // Quantiles of scatter, a workgroup each: for every ball size of the sample's densest third, of its sparsest third, of
 // all, and of all by steady shares.
 //
-// Reads: sampled, scatters. Writes: quantiles. After them, for each of the first sizes, the steady share of the largest
-// size up to it that has one; below 0 if none has.
+// Reads: sampled, scatters, picked. Writes: quantiles. After them, for each of the first sizes, the steady share of the
+// largest size up to it that has one; below 0 if none has.
 
 #import frame
 #import quantiles
@@ -11,6 +11,10 @@
 @group(0) @binding(1) var<storage, read> sampled: array<u32>;
 @group(0) @binding(2) var<storage, read> scatters: array<u32>;
 @group(0) @binding(3) var<storage, read_write> quantiles: array<Quantile>;
+@group(0) @binding(4) var<storage, read> picked: array<u32>;
+
+// Number of ball sizes that are measured at first.
+override FIRST_SCALES: u32;
 
 // Balls that hold enough to fit, and thin balls: of the workgroup's size, then of the next.
 var<workgroup> fitted: array<atomic<u32>, 2>;
@@ -18,6 +22,8 @@ var<workgroup> thin: array<atomic<u32>, 2>;
 // For each of the first sizes: the whole sample's thin balls with a fitted next ball, and the steady ones of them.
 var<workgroup> pairs: array<atomic<u32>, STEADY_SCALES>;
 var<workgroup> steady: array<atomic<u32>, STEADY_SCALES>;
+// Scatters of the part's balls of the workgroup's size, `TOO_FEW` for all others.
+var<workgroup> values: array<u32, MOST_SAMPLED>;
 // Rounds of three bits each in which the quantile is found, the first of a single bit, as values have 31.
 const ROUNDS = 11u;
 // For each round, the numbers of values below the candidates 1 to 8, two to a word.
@@ -36,8 +42,9 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let kept = sampled[MOST_SAMPLED];
     let len = select(kept / 3u, kept, part >= ALL);
     let begin = select(0u, kept - len, part == SPARSEST);
-    let first = scale * MOST_SAMPLED + begin;
-    let next = min(scale + 1u, SCALES - 1u) * MOST_SAMPLED + begin;
+    let measured = select(FIRST_SCALES, SCALES, picked[MEASURED] > 0u);
+    let scales = vec2u(scale, min(scale + 1u, SCALES - 1u));
+    let firsts = scales * MOST_SAMPLED;
     if local < 2u {
         atomicStore(&fitted[local], 0u);
         atomicStore(&thin[local], 0u);
@@ -52,12 +59,16 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     workgroupBarrier();
     var own_fitted = vec2u(0u);
     var own_thin = vec2u(0u);
-    for (var index = local; index < len; index += SMALL_GROUP) {
-        let bits = vec2u(scatters[first + index], scatters[next + index]);
+    for (var index = local; index < kept; index += SMALL_GROUP) {
+        // Ranks before the part wrap around, and are far too large.
+        let is_of_part = sampled[RANKS + index] - begin < len;
+        let is_known = vec2<bool>(is_of_part) & (scales < vec2u(measured));
+        let bits = select(vec2u(TOO_FEW), vec2u(scatters[firsts.x + index], scatters[firsts.y + index]), is_known);
+        values[index] = bits.x;
         own_fitted += select(vec2u(0u), vec2u(1u), bits != vec2u(TOO_FEW));
         own_thin += select(vec2u(0u), vec2u(1u), bits < vec2u(THICK));
     }
-    for (var size = 0u; size < STEADY_SCALES && scale < STEADY_SCALES; size++) {
+    for (var size = 0u; size < STEADY_SCALES && size + 1u < measured && scale < STEADY_SCALES; size++) {
         var own_pairs = 0u;
         var own_steady = 0u;
         for (var index = local; index < kept; index += SMALL_GROUP) {
@@ -98,8 +109,8 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     for (var round = 0u; round < ROUNDS; round++) {
         let shift = 3u * (ROUNDS - 1u - round);
         var own = vec4u(0u);
-        for (var index = local; index < len; index += SMALL_GROUP) {
-            let bits = scatters[first + index];
+        for (var index = local; index < kept; index += SMALL_GROUP) {
+            let bits = values[index];
             if bits != TOO_FEW && (bits < THICK || !is_thin) {
                 let value = bits & ~THICK;
                 // The value lies below all greater candidates.

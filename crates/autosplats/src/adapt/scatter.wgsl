@@ -1,15 +1,14 @@
-// Scatter of points about the quadrics of the balls around each sampled surfel: a workgroup per ball.
+// Scatter of points about the quadrics of the balls around each picked surfel, of the smallest sizes or of the others:
+// a workgroup per ball. Beside the smallest, the first workgroups sort the sample.
 //
-// Reads: counters, density, surfels, levels, clusters, sampled. Writes: scatters, ball size by ball size.
+// Reads: counters, density, surfels, levels, clusters, picked. Writes: scatters, ball size by ball size; sampled.
 
 #import frame
-#import base_radius
+#import ball_scatter
 #import density
 #import groups
 #import levels
-#import quadric
-#import scatters
-#import screen
+#import sorted_sample
 #import surfel
 #import together
 
@@ -18,33 +17,27 @@
 @group(0) @binding(3) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(4) var<storage, read> levels: array<Level>;
 @group(0) @binding(5) var<storage, read> clusters: array<vec4f>;
-@group(0) @binding(6) var<storage, read> sampled: array<u32>;
+@group(0) @binding(6) var<storage, read> picked: array<u32>;
 @group(0) @binding(7) var<storage, read_write> scatters: array<u32>;
+@group(0) @binding(8) var<storage, read_write> sampled: array<u32>;
+
+const SORTING_GROUPS = MOST_SAMPLED / TOGETHER;
 
 @compute @workgroup_size(TOGETHER)
 fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     own_place = local;
-    let index = group_index(workgroup);
-    let scale = index / MOST_SAMPLED;
-    let rank = index % MOST_SAMPLED;
-    if scale >= SCALES || rank >= sampled[MOST_SAMPLED] {
+    let group = group_index(workgroup);
+    let measured = picked[MEASURED];
+    if measured == 0u && group < SORTING_GROUPS {
+        sort_sample(group * TOGETHER + local, local, TOGETHER);
         return;
     }
-    let surfel = surfels[sampled[rank]];
-    let cell = density[density_cell(pixel_xy(surfel.pixel), counters[CELL_PX], counters[CELL_COLUMNS])];
-    var radius = base_radius(surfel, initial_radius_of(cell.count, counters[CELL_PX], surfel.center.z)) * STEP;
-    for (var smaller = 0u; smaller < scale; smaller++) {
-        radius *= STEP;
+    let index = measured * MOST_SAMPLED + group - select(0u, SORTING_GROUPS, measured == 0u);
+    if !is_picked(index) {
+        return;
     }
-    let ball = ball_around(surfel.center, radius, CELLS_PER_RADIUS);
-    let plane = plane_of(ball);
-    var found = TOO_FEW;
-    if plane.len >= LEAST_CLUSTERS {
-        let scatter = quadric_of(ball, plane.axis, curvature_of(plane)).scatter;
-        let distance = select(scatter, 0.0, scatter < ROUNDING_SCATTER_RADII * radius);
-        found = bitcast<u32>(distance) | select(THICK, 0u, distance < THIN_SCATTER_RADII * radius);
-    }
-    if local == 0u {
+    let found = scatter_of(index);
+    if tells() {
         scatters[index] = found;
     }
 }

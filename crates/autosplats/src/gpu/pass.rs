@@ -2,6 +2,8 @@
 
 use std::sync::PoisonError;
 
+use rayon::prelude::*;
+
 use super::Gpu;
 use super::compiled::{Pass, PassKey};
 use super::source::{LinkedSource, PassSource, PipelineParts, bind, compilation_options};
@@ -25,6 +27,18 @@ impl Pass {
         let pass = Self::compile(gpu, source, constants)?;
         lock().insert(key, pass.clone());
         Ok(pass)
+    }
+
+    /// Compiles passes side by side.
+    ///
+    /// # Errors
+    /// [`Error::Device`], as [`new`](Self::new).
+    pub(crate) fn all<const N: usize>(
+        gpu: &Gpu,
+        passes: [(&PassSource, &[(&str, f64)]); N],
+    ) -> Result<[Self; N], Error> {
+        let made = passes.into_par_iter().with_max_len(1).map(|(source, constants)| Self::new(gpu, source, constants));
+        Ok(made.collect::<Result<Vec<_>, _>>()?.try_into().expect("a pass of each"))
     }
 
     fn compile(gpu: &Gpu, source: &PassSource, constants: &[(&str, f64)]) -> Result<Self, Error> {

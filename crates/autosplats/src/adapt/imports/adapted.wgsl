@@ -1,6 +1,6 @@
-// Surfels adapted to noise, and shrunk where they are no surface: see the CPU form. The including pass binds `density`,
-// `levels`, `statistics`, `sheets` and `depth_noise`. It imports `balls` or `later`, which define who fits the balls
-// that a surfel needs. See docs/decisions/0010-outliers.md.
+// Surfels adapted to noise, and shrunk where they are no surface: see the CPU form. The including pass binds `counters`,
+// `density`, `levels`, `statistics`, `sheets`, `depth_noise` and `surfels`. It imports `balls` or `later`, which define
+// who fits the balls that a surfel needs. See docs/decisions/0010-outliers.md.
 
 #import frame
 #import calls
@@ -219,4 +219,12 @@ fn ended(adapted: Adapted, own_radius: f32) -> Surfel {
     }
     surfel.radius = opened(surfel, own_radius, adapted.noise);
     return surfel;
+}
+
+// Stores an adapted surfel, and counts it if that dropped it.
+fn keep_adapted(place: u32, before: Surfel, now: Surfel) {
+    surfels[place] = now;
+    if is_dropped(now) && !is_dropped(before) {
+        atomicAdd(&counters[OUTLIERS], 1u);
+    }
 }

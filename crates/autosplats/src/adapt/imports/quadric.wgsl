@@ -1,5 +1,5 @@
 // Quadrics, height fields with six coefficients over a ball's points: see the CPU form. The including pass binds
-// `levels` and `clusters`. It imports `together`, whose invocations sum up a ball.
+// `levels` and `clusters`. It imports `together` or `alone`, which tell what of a ball an invocation sums up.
 //
 // A ball has hundreds of cells, and waiting for a load takes longer than the sums. So four cells are read at a time,
 // with overlapping loads.

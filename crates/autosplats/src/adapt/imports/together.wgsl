@@ -1,10 +1,8 @@
-// Balls that the invocations of a workgroup sum up together: for the few that take long. All invocations ask for the
-// same ball, in uniform control flow, and get the same sums.
+// Balls that the invocations of a workgroup sum up together. All invocations ask for the same ball, in uniform control
+// flow, and get the same sums. Alternative: `alone`.
 
 #import quadric
 
-// Number of invocations: 8, 16 or 32.
-override TOGETHER: u32;
 // Rows of cells per step.
 const ROWS = 8u;
 // Vectors of the largest sums.
@@ -18,6 +16,11 @@ var<private> own_place: u32;
 const PART_ROW = 33u;
 var<workgroup> parts: array<vec4f, MAX_SUM_VECTORS * PART_ROW>;
 var<workgroup> totals: array<vec4f, MAX_SUM_VECTORS>;
+
+// Whether the invocation stores what all of them found.
+fn tells() -> bool {
+    return own_place == 0u;
+}
 
 fn own_start() -> vec2u {
     return vec2u(4u * (own_place / ROWS), own_place % ROWS);
