@@ -1,7 +1,7 @@
 // Moments to surfels, by the eigenvectors of the covariance [Paper, §6]. The CPU form says what differs from the
-// paper.
+// paper. Keeps the k-radii as starting radii of the next frame's search: see `search/past/mod.rs`.
 //
-// Reads: counters, density, points, source, queries, neighborhoods. Writes: surfels, counters.
+// Reads: counters, density, points, source, queries, neighborhoods. Writes: surfels, counters, past.
 
 #import frame
 #import density
@@ -9,6 +9,7 @@
 #import groups
 #import neighborhood
 #import orthonormal
+#import past_radii
 #import screen
 #import surfel
 
@@ -19,6 +20,7 @@
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
 @group(0) @binding(6) var<storage, read> neighborhoods: array<Neighborhood>;
 @group(0) @binding(7) var<storage, read_write> surfels: array<Surfel>;
+@group(0) @binding(8) var<storage, read_write> past: array<atomic<u32>>;
 
 // Values that all queries of a workgroup share.
 struct Task {
@@ -184,6 +186,18 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     );
 }
 
+// Of a pixel's points the greatest k-radius is kept, which is the same in every run.
+fn keep_k_radius(of_pixel: u32, sums: Neighborhood) {
+    if sums.count < f32(frame.k) || has_near_flag(of_pixel) {
+        return;
+    }
+    let pixel = pixel_xy(of_pixel);
+    let at = kept_at(pixel.y * frame.size.x + pixel.x);
+    if at < arrayLength(&past) {
+        atomicMax(&past[at], bitcast<u32>(sums.k_radius));
+    }
+}
+
 @compute @workgroup_size(SMALL_GROUP)
 fn fit(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
@@ -198,8 +212,10 @@ fn fit(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index)
     let index = group_index(workgroup) * SMALL_GROUP + local;
     if index < task.len {
         let place = task.first + index;
-        let fitted = surfel(queries[place], neighborhoods[place]);
+        let sums = neighborhoods[place];
+        let fitted = surfel(queries[place], sums);
         surfels[place] = fitted;
+        keep_k_radius(fitted.pixel, sums);
         if is_dropped(fitted) {
             atomicAdd(&outliers, 1u);
         }

@@ -40,21 +40,19 @@ pub(crate) fn surfel_buffer(gpu: &Gpu, capacity: u32) -> Result<wgpu::Buffer, Er
 
 /// The pass of the fit.
 #[derive(Debug)]
-pub(crate) struct FitPasses {
-    fit: Pass,
-}
+pub(crate) struct FitPass(Pass);
 
-impl FitPasses {
-    /// Compiles the passes.
+impl FitPass {
+    /// Compiles the pass.
     ///
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Ok(Self { fit: Pass::new(gpu, &FIT, &[])? })
+        Pass::new(gpu, &FIT, &[]).map(Self)
     }
 
     /// Fits surfels to the neighbourhoods of the queries of `round`.
-    pub(crate) fn steps(
+    pub(crate) fn step(
         &self,
         gpu: &Gpu,
         frame: &wgpu::Buffer,
@@ -62,10 +60,10 @@ impl FitPasses {
         neighborhoods: &wgpu::Buffer,
         surfels: &wgpu::Buffer,
         round: Round,
-    ) -> Vec<Step> {
-        let ScreenBuffers { counters, density, points, source, queries, .. } = screen;
-        let buffers = [frame, counters, density, points, source, queries, neighborhoods, surfels];
-        vec![self.fit.step(gpu, &buffers, screen.groups(round.work_64()))]
+    ) -> Step {
+        let ScreenBuffers { counters, density, points, source, queries, past, .. } = screen;
+        let buffers = [frame, counters, density, points, source, queries, neighborhoods, surfels, past];
+        self.0.step(gpu, &buffers, screen.groups(round.work_64()))
     }
 }
 

@@ -35,7 +35,8 @@ pub(crate) struct FrameUniform {
     /// 1 if the last frame showed the same points.
     pub(crate) same_points: u32,
     pub(crate) picture: [u32; 2],
-    pub(crate) margin: u32,
+    /// The half of the kept k-radii with those of the last frame; 0 or 1.
+    pub(crate) past_half: u32,
     /// 1 if the last picture showed the same points with the same settings and is averaged with this one.
     pub(crate) same_picture: u32,
     /// Columns, each padded to four numbers.
@@ -83,7 +84,7 @@ impl FrameUniform {
             frames_averaged: 1.0,
             same_points: 0,
             picture: view.picture_size(),
-            margin: view.margin,
+            past_half: 0,
             same_picture: 0,
             past_rotation: [[0.0; 4]; 3],
             past_shift: [0.0; 3],

@@ -93,7 +93,7 @@ pub(crate) use {constants, files, indices};
 const SHARED: Library = Library {
     files: &[files!(in "../shared":
         "cloud_points", "density", "depth_map", "divide", "drawing_groups", "eigen", "frame", "groups", "half",
-        "layers", "lines", "matters", "moved", "names", "neighborhood", "noise", "orthonormal", "picture",
+        "layers", "lines", "matters", "moved", "names", "neighborhood", "noise", "orthonormal", "past_radii", "picture",
         "project_point", "put_rounds", "put_work", "range_keys", "rank", "reproject", "screen", "sum_before",
         "surfel",
     )],

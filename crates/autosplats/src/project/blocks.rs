@@ -6,6 +6,8 @@ use rayon::prelude::*;
 
 /// Side of a block in pixels.
 pub(crate) const OCCUPANCY_BLOCK_PX: usize = 16;
+/// Side in pixels of the small blocks whose sixteenths with points are counted.
+pub(crate) const COUNTED_BLOCK_PX: usize = 4;
 
 /// The blocks of a screen that hold points.
 #[derive(Debug, Default)]

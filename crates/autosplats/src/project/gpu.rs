@@ -2,7 +2,7 @@
 
 pub(crate) use super::Round;
 use super::device_cloud::{Chunk, DeviceCloud};
-use super::{MARGIN_REACH, ScreenPoint, cpu, near};
+use super::{COUNTED_BLOCK_PX, MARGIN_REACH, ScreenPoint, cpu, near};
 use crate::Error;
 use crate::gpu::{
     DISPATCH_BYTES, Gpu, Groups, INT64_ATOMICS, INT64_IN_LANES, Library, Pass, Step, constants, files, indices, passes,
@@ -31,7 +31,7 @@ const LIBRARY: Library = Library {
             FACE_CELLS, FIRST_OCTAVE, LISTED_OCTAVES, MOST_NEAR, NEAR_CELLS, NEAR_POINTS, NEAR_REACH, OCTAVES,
             SPARSE_POINTS
         ),
-        constants![ENTRY_WORDS, MARGIN_REACH, POINTS_PER_LANE, RANK_BLOCK_FLAGS],
+        constants![COUNTED_BLOCK_PX, ENTRY_WORDS, MARGIN_REACH, POINTS_PER_LANE, RANK_BLOCK_FLAGS],
     ],
 };
 
@@ -192,6 +192,8 @@ pub(crate) struct ScreenBuffers {
     pub(crate) cell_start: wgpu::Buffer,
     /// Bits of the sixteenths that hold points, two pixels to a `u32`.
     pub(crate) sixteenths: wgpu::Buffer,
+    /// Number of them in each block of [`COUNTED_BLOCK_PX`] pixels, row by row.
+    pub(crate) held: wgpu::Buffer,
     /// Index in the cloud of each screen point.
     pub(crate) source: wgpu::Buffer,
     pixels: wgpu::Buffer,
@@ -209,6 +211,8 @@ pub(crate) struct ScreenBuffers {
     pub(crate) depth: wgpu::Buffer,
     /// Centres of splats in each pixel, row by row (`splat/centers.rs`).
     pub(crate) centers: wgpu::Buffer,
+    /// K-radii of the last frame and of this one, as `shared/past_radii.wgsl` has them; none unless `keeping_past`.
+    pub(crate) past: wgpu::Buffer,
     /// Workgroup counts of each [`Work`], three `u32` each: those that `count` tells, those that `split` tells, and the
     /// others. A pass cannot write the buffer that has its own count.
     pub(crate) arguments: [wgpu::Buffer; 3],
@@ -247,6 +251,10 @@ impl ScreenBuffers {
             density: gpu.storage::<DensityCell>("density grid", width.div_ceil(2) * height.div_ceil(2))?,
             cell_start: gpu.storage::<u32>("starts of cells", pixels + 1)?,
             sixteenths: gpu.storage::<u32>("sixteenths of pixels", pixels.div_ceil(2))?,
+            held: gpu.storage::<u32>(
+                "sixteenths of blocks",
+                width.div_ceil(COUNTED_BLOCK_PX) * height.div_ceil(COUNTED_BLOCK_PX),
+            )?,
             source: gpu.storage::<u32>("sources of screen points", capacity)?,
             pixels: gpu.storage::<u32>("pixels of screen points", capacity)?,
             points: gpu.storage::<ScreenPoint>("screen points", capacity)?,
@@ -258,8 +266,18 @@ impl ScreenBuffers {
                 .storage::<u32>("sums of blocks", slots.max(capacity).div_ceil(RANK_BLOCK_FLAGS as usize))?,
             depth: gpu.storage::<u32>("depth map", pixels)?,
             centers: gpu.storage::<u32>("centres of splats", pixels)?,
+            past: gpu.storage::<u32>("no k-radii", 0)?,
             arguments: [arguments()?, arguments()?, arguments()?],
         })
+    }
+
+    /// With room for the k-radii of two frames, which searches of frame after frame start from.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLimit`] or [`Error::DeviceMemory`] if the device has too little.
+    pub(crate) fn keeping_past(self, gpu: &Gpu) -> Result<Self, Error> {
+        let pixels = self.size.iter().map(|&side| side as usize).product::<usize>();
+        Ok(Self { past: gpu.storage::<[u32; 2]>("k-radii of two frames", pixels)?, ..self })
     }
 
     /// Number of workgroups of `work`, as the device computed it last.
@@ -397,17 +415,20 @@ impl ProjectPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu, way: Nearest) -> Result<Self, Error> {
-        let pass = |source| Pass::new(gpu, source, &[]);
-        Ok(Self {
-            clear: pass(&CLEAR)?,
-            nearest: NearestPass::new(gpu, way)?,
-            occupancy: pass(&OCCUPANCY)?,
-            count: pass(&COUNT)?,
-            compact: pass(&COMPACT)?,
-            gather: pass(&GATHER)?,
-            split_count: pass(&SPLIT_COUNT)?,
-            split: Pass::new(gpu, &SPLIT, &[drawing_constant(gpu)])?,
-        })
+        let [clear, occupancy, count, compact, gather, split_count, split] = Pass::all(
+            gpu,
+            [
+                (&CLEAR, &[]),
+                (&OCCUPANCY, &[]),
+                (&COUNT, &[]),
+                (&COMPACT, &[]),
+                (&GATHER, &[]),
+                (&SPLIT_COUNT, &[]),
+                (&SPLIT, &[drawing_constant(gpu)]),
+            ],
+        )?;
+        let nearest = NearestPass::new(gpu, way)?;
+        Ok(Self { clear, nearest, occupancy, count, compact, gather, split_count, split })
     }
 
     /// Projects `cloud` into `screen`.
@@ -420,18 +441,18 @@ impl ProjectPasses {
     ) -> Vec<Step> {
         // Without room there are no points.
         let Some(names) = cloud.names() else { return Vec::new() };
-        let ScreenBuffers { counters, keys, near, density, cell_start, sixteenths, .. } = screen;
-        let ScreenBuffers { source, pixels, points, values, block_sums, depth, centers, arguments, .. } = screen;
+        let ScreenBuffers { counters, keys, near, density, cell_start, sixteenths, held, .. } = screen;
+        let ScreenBuffers { source, pixels, points, values, block_sums, depth, centers, past, arguments, .. } = screen;
         let [width, height] = screen.size;
         let slots = (width * height) << u32::from(screen.halves);
         let slot_blocks = slots.div_ceil(RANK_BLOCK_FLAGS);
         let cleared = (width * height).max(near::NEAR_CELLS as u32);
-        let clear = [frame, density, counters, sixteenths, near, depth, centers];
+        let clear = [frame, density, counters, sixteenths, near, depth, centers, past];
         let mut steps = vec![self.clear.step(gpu, &clear, cleared.div_ceil(GROUP))];
         steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
         const BLOCK_PX: u32 = cpu::OCCUPANCY_BLOCK_PX as u32;
         let covered_blocks = width.div_ceil(BLOCK_PX) * height.div_ceil(BLOCK_PX);
-        steps.push(self.occupancy.step(gpu, &[frame, keys, counters, sixteenths], covered_blocks));
+        steps.push(self.occupancy.step(gpu, &[frame, keys, counters, sixteenths, held], covered_blocks));
         // Blocks beyond the slots, which only hold points of sparse cells, count none.
         let blocks = slots.max(screen.capacity).div_ceil(RANK_BLOCK_FLAGS);
         let count = [frame, keys, counters, block_sums, density, near, source, sixteenths, &arguments[0]];

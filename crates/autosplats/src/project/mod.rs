@@ -30,7 +30,7 @@ mod slots;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use blocks::{Blocks, OCCUPANCY_BLOCK_PX};
+pub(crate) use blocks::{Blocks, COUNTED_BLOCK_PX, OCCUPANCY_BLOCK_PX};
 pub(crate) use cpu::Projector;
 #[cfg(test)]
 pub(crate) use device_cloud::ChunkUniform;

@@ -19,8 +19,6 @@ pub(crate) struct SearchBuffers<'a> {
     pub(crate) screen: &'a ScreenBuffers,
     /// `Neighborhood` of `shared/neighborhood.wgsl` for each query, in query order.
     pub(crate) neighborhoods: &'a wgpu::Buffer,
-    /// Bits of a k-radius for each pixel of the last frame, 0 for none. Valid only if `frame` describes that frame.
-    pub(crate) past: &'a wgpu::Buffer,
 }
 
 /// The compiled passes of an engine, for one k.

@@ -48,8 +48,8 @@ pub(crate) fn compile(gpu: &Gpu, engine: SearchEngine, k: u32) -> Result<Box<dyn
 
 impl EnginePasses for SearchPasses {
     fn steps(&self, gpu: &Gpu, buffers: SearchBuffers<'_>) -> Result<EngineSteps, Error> {
-        let SearchBuffers { frame, screen, neighborhoods, past, .. } = buffers;
-        let round = |round| self.steps(gpu, frame, screen, neighborhoods, past, round);
+        let SearchBuffers { frame, screen, neighborhoods, .. } = buffers;
+        let round = |round| self.steps(gpu, frame, screen, neighborhoods, round);
         Ok(EngineSteps { rounds: [Round::Active, Round::Recovered].map(round), convergence: None })
     }
 }

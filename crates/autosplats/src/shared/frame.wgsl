@@ -33,9 +33,10 @@ struct Frame {
     frames_averaged: f32,
     // 1 if the last frame had the same points.
     same_points: u32,
-    // Size of the picture in pixels, and width of the margin around it.
+    // Size of the picture in pixels.
     picture: vec2u,
-    margin: u32,
+    // The half of the kept k-radii with those of the last frame: see `past_radii`.
+    past_half: u32,
     // 1 if the last picture had the same points and settings and is to be averaged with.
     same_picture: u32,
     // The last frame, of the same size and kind of projection: transform from this view space into that one, and focal

@@ -5,6 +5,7 @@
 // write again where a patch was and stays empty.
 
 #import frame
+#import blocks
 #import depth_map
 #import groups
 #import layers
@@ -36,6 +37,9 @@ override BACK_SLOTS: u32;
 
 // What an earlier frame told of the patch.
 var<workgroup> was_left_empty: bool;
+// What is told of its blocks, row by row.
+const PATCH_BLOCKS = PATCH / BLOCK_PX;
+var<workgroup> rims: array<atomic<u32>, PATCH_BLOCKS.x * PATCH_BLOCKS.y>;
 var<workgroup> normals: array<vec3f, BATCH>;
 var<workgroup> sources: array<u32, BATCH>;
 var<workgroup> reaches: array<f32, BATCH>;
@@ -181,6 +185,9 @@ fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     begin(&upper, pixel);
     begin(&lower, pixel + vec2u(0u, 4u));
     let mark = patch_mark(corner);
+    if local < PATCH_BLOCKS.x * PATCH_BLOCKS.y {
+        atomicStore(&rims[local], 0u);
+    }
     if local == 0u {
         was_left_empty = cover[mark].point == LEFT_EMPTY;
     }
@@ -189,10 +196,19 @@ fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     if is_left_empty && !is_met {
         return;
     }
-    end(&upper, pixel);
-    end(&lower, pixel + vec2u(0u, 4u));
+    // Four rows are a block's.
+    let own = own_offset(local) / BLOCK_PX;
+    atomicOr(&rims[own.y * PATCH_BLOCKS.x + own.x], end(&upper, pixel));
+    atomicOr(&rims[(own.y + 1u) * PATCH_BLOCKS.x + own.x], end(&lower, pixel + vec2u(0u, 4u)));
     if local == 0u {
         cover[mark].point = select(LEFT_EMPTY, 0u, is_met);
+    }
+    workgroupBarrier();
+    if local < PATCH_BLOCKS.x * PATCH_BLOCKS.y {
+        let block = corner / BLOCK_PX + vec2u(local % PATCH_BLOCKS.x, local / PATCH_BLOCKS.x);
+        if all(block < block_counts()) {
+            cover[block_mark(block)].point = atomicLoad(&rims[local]);
+        }
     }
 }
 
@@ -211,17 +227,16 @@ fn begin(sums: ptr<private, Sums>, first: vec2u) {
     (*sums).point = vec4u(NO_POINT);
 }
 
-fn end(sums: ptr<private, Sums>, first: vec2u) {
-    normalize_sums(sums, first, 0u);
-    normalize_sums(sums, first, 1u);
-    normalize_sums(sums, first, 2u);
-    normalize_sums(sums, first, 3u);
+// Stores four pixels, and returns their bits in their block: see `blocks`.
+fn end(sums: ptr<private, Sums>, first: vec2u) -> u32 {
+    let upper_bits = normalize_sums(sums, first, 0u) | normalize_sums(sums, first, 1u);
+    return upper_bits | normalize_sums(sums, first, 2u) | normalize_sums(sums, first, 3u);
 }
 
-// Divides the sums of one of four pixels by the weights, into the layers.
-fn normalize_sums(sums: ptr<private, Sums>, first: vec2u, i: u32) {
+// Divides the sums of one of four pixels by the weights, into the layers. Returns the pixel's bits in its block.
+fn normalize_sums(sums: ptr<private, Sums>, first: vec2u, i: u32) -> u32 {
     if any(first + vec2u(0u, i) >= frame.size) {
-        return;
+        return 0u;
     }
     let at = pixel_index(first, i);
     let weight = (*sums).weight[i];
@@ -262,4 +277,5 @@ fn normalize_sums(sums: ptr<private, Sums>, first: vec2u, i: u32) {
     if BACKS && !COLOR && !MEASURES {
         extras[at] = vec4f(0.0, 0.0, 0.0, (*sums).back[i] / divisor);
     }
+    return select(select(0u, 0x10000u, rim < EMPTY_RIM), 1u, rim == EMPTY_RIM) << rim_bit(first + vec2u(0u, i));
 }

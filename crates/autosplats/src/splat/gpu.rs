@@ -12,13 +12,13 @@
 //! the order.
 
 use super::layers::{Channels, LayerBuffers, PATCH};
-use super::trim::blurred::{self, BLOCK_PX};
+use super::trim::blurred;
 use super::trim::{self, ACROSS, LINES, OWN_SIXTEENTHS, SIDES};
 use super::{centers, raster, setup};
 use crate::Error;
 use crate::adapt::FrameStatistics;
 use crate::fit::{SUPPORT, Surfel};
-use crate::gpu::{Gpu, Library, Pass, SMALL_GROUP, Step, constants, files, passes};
+use crate::gpu::{Gpu, Library, Pass, Step, constants, files, passes};
 use crate::project::MARGIN_REACH;
 use crate::project::gpu::{Counter, RANK_BLOCK_FLAGS, Round, ScreenBuffers, Work, drawing_constant};
 
@@ -83,7 +83,6 @@ passes! {
     ERASE = "erase",
     REDRAW = "redraw",
     ATTRIBUTES = "attributes",
-    SUM_BLOCKS = "sum_blocks",
     TRIM = "trim",
 }
 
@@ -127,8 +126,6 @@ pub(crate) struct SplatBuffers {
     /// Change of each splat in the last refinement, and the marks of cells with erased depths (`imports/redraw.wgsl`).
     changes: wgpu::Buffer,
     cells: wgpu::Buffer,
-    /// Blocks of pixels, row by row (`imports/blocks.wgsl`).
-    blocks: wgpu::Buffer,
     /// Zeros for frames whose noise is not measured.
     no_noise: wgpu::Buffer,
 }
@@ -146,7 +143,6 @@ impl SplatBuffers {
             tree: gpu.storage::<[u32; 2]>("tree of splats", nodes)?,
             changes: gpu.storage::<u32>("changes of splats", screen_capacity as usize)?,
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
-            blocks: gpu.storage::<[u32; 2]>("blocks of pixels", block_count(size) as usize)?,
             no_noise: gpu.storage::<FrameStatistics>("no noise", 1)?,
         })
     }
@@ -164,10 +160,8 @@ pub(crate) struct SplatPasses {
     erase: Pass,
     redraw: Pass,
     attributes: Pass,
-    sum_blocks: Pass,
     /// Counts covered pixels, and trims if `trims`.
     trim: Pass,
-    trims: bool,
     /// Linear value of each 8-bit step of a colour.
     linear: wgpu::Buffer,
 }
@@ -179,8 +173,7 @@ impl SplatPasses {
     /// # Errors
     /// [`Error::Device`], [`Error::DeviceMemory`].
     pub(crate) fn new(gpu: &Gpu, channels: Channels, trims: bool, linear: &[f32; 256]) -> Result<Self, Error> {
-        let pass = |source| Pass::new(gpu, source, &[]);
-        let groups = drawing_constant(gpu);
+        let groups = &[drawing_constant(gpu)][..];
         let Channels { color, scalar, measures, backs } = channels;
         let slots = |carried: bool| if carried { f64::from(BATCH) } else { 1.0 };
         let attributes = [
@@ -195,19 +188,32 @@ impl SplatPasses {
         ];
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
+        let [set_up, boxes, depth, recover_count, recover, refine, erase, redraw, attributes, trim] = Pass::all(
+            gpu,
+            [
+                (&SET_UP, &[]),
+                (&BOXES, &[]),
+                (&DEPTH, groups),
+                (&RECOVER_COUNT, &[]),
+                (&RECOVER, groups),
+                (&REFINE, &[]),
+                (&ERASE, groups),
+                (&REDRAW, groups),
+                (&ATTRIBUTES, &attributes),
+                (&TRIM, &[("TRIMS", trims.into())]),
+            ],
+        )?;
         Ok(Self {
-            set_up: pass(&SET_UP)?,
-            boxes: pass(&BOXES)?,
-            depth: Pass::new(gpu, &DEPTH, &[groups])?,
-            recover_count: pass(&RECOVER_COUNT)?,
-            recover: Pass::new(gpu, &RECOVER, &[groups])?,
-            refine: pass(&REFINE)?,
-            erase: Pass::new(gpu, &ERASE, &[groups])?,
-            redraw: Pass::new(gpu, &REDRAW, &[groups])?,
-            attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
-            sum_blocks: pass(&SUM_BLOCKS)?,
-            trim: Pass::new(gpu, &TRIM, &[("TRIMS", trims.into())])?,
-            trims,
+            set_up,
+            boxes,
+            depth,
+            recover_count,
+            recover,
+            refine,
+            erase,
+            redraw,
+            attributes,
+            trim,
             linear: steps,
         })
     }
@@ -271,8 +277,8 @@ impl SplatPasses {
         layers: &LayerBuffers,
         rules: LayerRules<'_>,
     ) -> Vec<Step> {
-        let SplatBuffers { splats: list, tree, blocks: summed, no_noise, .. } = splats;
-        let ScreenBuffers { counters, values, sixteenths, depth, centers, .. } = screen;
+        let SplatBuffers { splats: list, tree, no_noise, .. } = splats;
+        let ScreenBuffers { counters, values, sixteenths, held, depth, centers, .. } = screen;
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let mut steps = Vec::new();
         for _ in 0..if rules.depth_refinement { 2 } else { 0 } {
@@ -282,11 +288,7 @@ impl SplatPasses {
         let attributes = [frame, &self.linear, list, tree, surfels, values, depth, surface, cover, extras];
         steps.push(self.attributes.step(gpu, &attributes, patches(screen, PATCH)));
         let noise = rules.noise.unwrap_or(no_noise);
-        if self.trims {
-            let blocks = [frame, cover, sixteenths, noise, summed];
-            steps.push(self.sum_blocks.step(gpu, &blocks, block_count(screen.size).div_ceil(SMALL_GROUP)));
-        }
-        let trim = [frame, surface, cover, extras, counters, centers, sixteenths, noise, summed];
+        let trim = [frame, surface, cover, extras, counters, centers, sixteenths, noise, held];
         steps.push(self.trim.step(gpu, &trim, patches(screen, [SQUARE; 2])));
         steps
     }
@@ -310,11 +312,6 @@ fn tops(screen: &ScreenBuffers) -> u32 {
 /// Cells in a picture of this size, with one more column and row.
 fn cells([columns, rows]: [u32; 2]) -> u32 {
     ((columns >> CELL_BITS) + 1) * ((rows >> CELL_BITS) + 1)
-}
-
-/// Blocks of pixels in a picture of this size.
-fn block_count(size: [u32; 2]) -> u32 {
-    size.map(|side| side.div_ceil(BLOCK_PX as u32)).iter().product()
 }
 
 /// Workgroups for rectangles of this many columns and rows.

@@ -6,6 +6,7 @@ use super::{GBuffer, TILE_AREA, Tiles};
 use crate::Error;
 use crate::camera::View;
 use crate::gpu::Gpu;
+use crate::project::COUNTED_BLOCK_PX;
 use crate::room::fit;
 
 /// Optional attributes that splats carry beside depth and normal.
@@ -144,7 +145,7 @@ pub(crate) struct LayerBuffers {
     /// Normal and depth, four `f32` per pixel.
     pub(crate) surface: wgpu::Buffer,
     /// Per pixel sum of weights, rim, point (`u32`) and scalar: `Cover` in `shared/layers.wgsl`. Then an element for
-    /// each patch (`splat/imports/patches.wgsl`).
+    /// each patch (`splat/imports/patches.wgsl`) and for each block (`splat/imports/blocks.wgsl`).
     pub(crate) cover: wgpu::Buffer,
     /// Planes of four `f32` per pixel, one after the other. A plane of linear RGB if there are colours, then one of
     /// splat radius, k-radius and curvature if there are measures. With backs alone there is one plane, otherwise
@@ -166,7 +167,7 @@ impl LayerBuffers {
     /// Whether the device can bind the buffers of [`new`](Self::new).
     pub(crate) fn has_room(gpu: &Gpu, size: [u32; 2], channels: Channels) -> bool {
         let pixels = size[0] as usize * size[1] as usize;
-        gpu.binds::<[f32; 4]>((channels.planes() * pixels).max(pixels + patch_count(size)))
+        gpu.binds::<[f32; 4]>((channels.planes() * pixels).max(pixels + mark_count(size)))
     }
 
     /// Buffers for a screen of `size`.
@@ -179,7 +180,7 @@ impl LayerBuffers {
             size,
             channels,
             surface: gpu.storage::<[f32; 4]>("normals and depths", pixels)?,
-            cover: gpu.storage::<Cover>("cover of pixels", pixels + patch_count(size))?,
+            cover: gpu.storage::<Cover>("cover of pixels", pixels + mark_count(size))?,
             extras: gpu.storage::<[f32; 4]>("colours and measures", channels.planes() * pixels)?,
         })
     }
@@ -237,10 +238,10 @@ impl LayerBuffers {
     }
 }
 
-/// Patches of a screen of `size`.
-fn patch_count(size: [u32; 2]) -> usize {
-    let [columns, rows] = [0, 1].map(|axis| size[axis].div_ceil(PATCH[axis]) as usize);
-    columns * rows
+/// Patches and blocks of a screen of `size`.
+fn mark_count(size: [u32; 2]) -> usize {
+    let count = |side: [u32; 2]| size[0].div_ceil(side[0]) as usize * size[1].div_ceil(side[1]) as usize;
+    count(PATCH) + count([COUNTED_BLOCK_PX as u32; 2])
 }
 
 /// Uploads the host's layers.

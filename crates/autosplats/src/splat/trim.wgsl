@@ -1,6 +1,6 @@
 // Trim: removes the tails that splats leave around a silhouette. The CPU form is `trim.rs`.
 //
-// Reads: centers, sixteenths, statistics, blocks. Reads and writes: surface, cover, extras. Writes: counters. Of other
+// Reads: centers, sixteenths, statistics, held. Reads and writes: surface, cover, extras. Writes: counters. Of other
 // pixels it reads only the rims, which no invocation writes. Squares that no splat meets are left as they are.
 
 #import frame
@@ -19,7 +19,7 @@
 @group(0) @binding(5) var<storage, read> centers: array<u32>;
 @group(0) @binding(6) var<storage, read> sixteenths: array<u32>;
 @group(0) @binding(7) var<storage, read> statistics: FrameStatistics;
-@group(0) @binding(8) var<storage, read> blocks: array<Block>;
+@group(0) @binding(8) var<storage, read> held: array<u32>;
 
 // 1 to trim, 0 only to count covered pixels.
 override TRIMS: u32;
@@ -88,7 +88,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         // Unsigned wrap-around moves blocks before the first far beyond the last.
         let block = corner / BLOCK_PX + at - 1u;
         if all(block < block_counts()) {
-            let rims = blocks[block.y * block_counts().x + block.x].rims;
+            let rims = cover[block_mark(block)].point;
             let first = BLOCK_PX * at;
             for (var row = 0u; row < BLOCK_PX; row++) {
                 let empty = (rims >> (BLOCK_PX * row)) & 15u;
@@ -107,7 +107,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
             let at = vec2u(place % WIDE_BLOCKS, place / WIDE_BLOCKS);
             // Unsigned wrap-around moves blocks before the first far beyond the last.
             let block = corner / BLOCK_PX + at - BLOCK_MARGIN;
-            if all(block < block_counts()) && (blocks[block.y * block_counts().x + block.x].held & EMPTY_BLOCK) != 0u {
+            if all(block < block_counts()) && is_empty_block(block) {
                 atomicOr(&empty_blocks[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
                 atomicStore(&is_any_empty, 1u);
             }
@@ -315,10 +315,10 @@ fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
     return mean_of_splats(pixel, select(MIN_SPLATS[0], MIN_SPLATS[1], wide));
 }
 
-// Rim of a pixel: see `rim_in`.
+// Rim of a pixel: 1 if the pixel is empty, plus 0x10000 if it is in a core.
 fn rim_of(pixel: vec2u) -> u32 {
     let block = pixel / BLOCK_PX;
-    return rim_in(blocks[block.y * block_counts().x + block.x], pixel);
+    return (cover[block_mark(block)].point >> rim_bit(pixel)) & 0x10001u;
 }
 
 fn is_empty(pixel: vec2u) -> bool {

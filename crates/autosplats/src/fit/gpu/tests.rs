@@ -74,9 +74,23 @@ impl Case {
         surfels
     }
 
-    /// Surfels of both rounds, and the number counted as outliers.
-    fn on_device(&self, gpu: &Gpu, passes: &FitPasses, rules: &FitRules) -> (Surfels, usize) {
-        let buffers = upload_screen(gpu, &self.screen, &self.view);
+    /// The greatest k-radius of each pixel's points that found k neighbours; 0 where none did.
+    fn kept(&self, surfels: &[Surfel], moments: &[Moments]) -> Vec<f32> {
+        let mut kept = vec![0.0_f32; self.view.width as usize * self.view.height as usize];
+        for (surfel, moments) in surfels.iter().zip(moments) {
+            let point = &self.screen.points[surfel.screen() as usize];
+            if moments.count >= RULES.k as f32 && !point.is_near() {
+                let [x, y] = point.pixel_xy();
+                let kept = &mut kept[y * self.view.width as usize + x];
+                *kept = kept.max(moments.k_radius);
+            }
+        }
+        kept
+    }
+
+    /// Surfels of both rounds, the number counted as outliers, and the k-radii kept for each pixel.
+    fn on_device(&self, gpu: &Gpu, pass: &FitPass, rules: &FitRules) -> (Surfels, usize, Vec<f32>) {
+        let buffers = upload_screen(gpu, &self.screen, &self.view).keeping_past(gpu).expect("room");
         let moments: Vec<_> = self.moments().iter().map(|moments| moments.to_device()).collect();
         let neighborhoods = gpu.storage_with("neighbourhoods", &moments).expect("room");
         let surfels = surfel_buffer(gpu, buffers.capacity).expect("room");
@@ -92,12 +106,14 @@ impl Case {
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
         gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
         for round in [Round::Active, Round::Recovered] {
-            let steps = passes.steps(gpu, &frame, &buffers, &neighborhoods, &surfels, round);
-            run_round(gpu, &buffers, round, &steps);
+            let step = pass.step(gpu, &frame, &buffers, &neighborhoods, &surfels, round);
+            run_round(gpu, &buffers, round, &[step]);
         }
         let counters: Vec<u32> = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");
         let surfels = read_back(gpu, &surfels, moments.len()).expect("surfels");
-        (surfels, counters[Counter::Outliers as usize] as usize)
+        let pixels = self.view.width as usize * self.view.height as usize;
+        let mut kept: Vec<f32> = read_back(gpu, &buffers.past, 2 * pixels).expect("k-radii");
+        (surfels, counters[Counter::Outliers as usize] as usize, kept.split_off(pixels))
     }
 }
 
@@ -144,7 +160,7 @@ fn compare(device: &Surfel, host: &Surfel, moments: &Moments) -> Result<(), Stri
 #[test]
 fn the_device_fits_what_the_host_fits() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = FitPasses::new(&gpu).expect("passes");
+    let pass = FitPass::new(&gpu).expect("a pass");
     let (mut compared, mut outliers, mut different) = (0, 0, 0);
     for (name, positions) in test_clouds::all(4000) {
         for projection in [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)] {
@@ -154,8 +170,9 @@ fn the_device_fits_what_the_host_fits() {
                 for (longest, keep_outliers, splat_scale) in [(LONGEST, false, 1.0), (1.0, true, 0.7)] {
                     let rules = FitRules { longest, keep_outliers, splat_scale, ..RULES };
                     let host = case.on_host(&rules);
-                    let (device, counted) = case.on_device(&gpu, &passes, &rules);
+                    let (device, counted, kept) = case.on_device(&gpu, &pass, &rules);
                     assert_eq!(device.len(), host.len(), "{name}: every query gives a surfel");
+                    assert!(kept == case.kept(&host, &moments), "{name}, {projection:?}: other k-radii are kept");
                     for ((device, host), moments) in device.iter().zip(&host).zip(&moments) {
                         let outcome = compare(device, host, moments);
                         different += usize::from(outcome.is_err());
@@ -177,12 +194,12 @@ fn the_device_fits_what_the_host_fits() {
 #[test]
 fn the_device_makes_the_dots_that_the_host_makes() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = FitPasses::new(&gpu).expect("passes");
+    let pass = FitPass::new(&gpu).expect("a pass");
     for projection in [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)] {
         let case = Case::new(&test_clouds::sphere(40), projection, Some(4.0));
         let rules = FitRules { dot_px: Some(7.0), ..RULES };
         let host = case.on_host(&rules);
-        let (device, dropped) = case.on_device(&gpu, &passes, &rules);
+        let (device, dropped, _) = case.on_device(&gpu, &pass, &rules);
         assert!(host.len() > 10 && dropped == 0, "{dropped} of {} are dropped", host.len());
         for (device, host) in device.iter().zip(&host) {
             let px = host.radius / case.view.pixel_size(host.center[2]);
@@ -200,7 +217,7 @@ fn the_device_makes_the_dots_that_the_host_makes() {
 #[test]
 fn the_device_drops_what_the_host_drops() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = FitPasses::new(&gpu).expect("passes");
+    let pass = FitPass::new(&gpu).expect("a pass");
     let mut random = Random::new(3);
     let mut positions = test_clouds::sphere(4000);
     positions.extend((0..3000).map(|_| random.direction().map(|c| c * (1.0 + 0.5 * random.unit()))));
@@ -208,7 +225,7 @@ fn the_device_drops_what_the_host_drops() {
     let plain = case.on_host(&RULES);
     let rules = FitRules { scan_lines: true, compares_density: true, ..RULES };
     let host = case.on_host(&rules);
-    let (device, counted) = case.on_device(&gpu, &passes, &rules);
+    let (device, counted, _) = case.on_device(&gpu, &pass, &rules);
     let is_dropped = |surfel: &Surfel| surfel.is_dropped();
     let same = host.iter().zip(&device).filter(|(host, device)| is_dropped(host) == is_dropped(device)).count();
     assert!(host.len() - same <= 1, "{same} of {} are dropped alike", host.len());

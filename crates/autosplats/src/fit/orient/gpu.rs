@@ -32,17 +32,15 @@ pub(crate) fn write_sensors(gpu: &Gpu, sensors: &Sensors, to: &wgpu::Buffer) {
 
 /// The pass.
 #[derive(Debug)]
-pub(crate) struct OrientPasses {
-    orient: Pass,
-}
+pub(crate) struct OrientPass(Pass);
 
-impl OrientPasses {
-    /// Compiles the passes.
+impl OrientPass {
+    /// Compiles the pass.
     ///
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Ok(Self { orient: Pass::new(gpu, &ORIENT, &[])? })
+        Pass::new(gpu, &ORIENT, &[]).map(Self)
     }
 
     /// Marks the surfels of a round that show their back.
@@ -56,6 +54,6 @@ impl OrientPasses {
         round: Round,
     ) -> Step {
         let buffers = [frame, &screen.counters, sensors, surfels];
-        self.orient.step(gpu, &buffers, screen.groups(round.work_64()))
+        self.0.step(gpu, &buffers, screen.groups(round.work_64()))
     }
 }

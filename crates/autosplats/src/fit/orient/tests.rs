@@ -2,7 +2,7 @@
 
 use autosplats_cloud::glam::{DMat4, DVec3};
 
-use super::gpu::{OrientPasses, sensor_buffer, write_sensors};
+use super::gpu::{OrientPass, sensor_buffer, write_sensors};
 use super::*;
 use crate::camera::{Camera, Projection};
 use crate::cancel::NEVER;
@@ -112,7 +112,7 @@ fn only_what_is_sure_is_a_back() {
 #[test]
 fn the_device_marks_what_the_host_marks() {
     let Some(gpu) = test_gpu() else { return };
-    let passes = OrientPasses::new(&gpu).expect("passes");
+    let pass = OrientPass::new(&gpu).expect("a pass");
     let mut random = Random::new(91);
     let (mut compared, mut backs, mut different) = (0, 0, 0);
     for scans in [1, 2, 3, 1000] {
@@ -135,7 +135,7 @@ fn the_device_marks_what_the_host_marks() {
                 let normal = Vec3::from(surfel.normal);
                 surfel.normal = (normal * normal.dot(to_eye).signum()).to_array();
             }
-            let device = on_device(&gpu, &passes, &sensors, &surfels, &view);
+            let device = on_device(&gpu, &pass, &sensors, &surfels, &view);
             sensors.orient(&mut surfels, &view, &NEVER);
             compared += surfels.len();
             backs += surfels.iter().filter(|surfel| surfel.shows_back()).count();
@@ -148,7 +148,7 @@ fn the_device_marks_what_the_host_marks() {
 }
 
 /// Marks a third of the surfels in the first round, the rest in the second.
-fn on_device(gpu: &Gpu, passes: &OrientPasses, sensors: &Sensors, surfels: &[Surfel], view: &View) -> Vec<Surfel> {
+fn on_device(gpu: &Gpu, pass: &OrientPass, sensors: &Sensors, surfels: &[Surfel], view: &View) -> Vec<Surfel> {
     let screen = ScreenBuffers::new(gpu, [view.width, view.height], false, 0, 0).expect("room");
     let active = surfels.len() / 3;
     for (counter, value) in [(Counter::Active, active), (Counter::Recovered, surfels.len() - active)] {
@@ -161,7 +161,7 @@ fn on_device(gpu: &Gpu, passes: &OrientPasses, sensors: &Sensors, surfels: &[Sur
     write_sensors(gpu, sensors, &known);
     let buffer = gpu.storage_with("surfels", surfels).expect("room");
     for round in [Round::Active, Round::Recovered] {
-        run_round(gpu, &screen, round, &[passes.step(gpu, &frame, &screen, &known, &buffer, round)]);
+        run_round(gpu, &screen, round, &[pass.step(gpu, &frame, &screen, &known, &buffer, round)]);
     }
     read_back(gpu, &buffer, surfels.len()).expect("surfels")
 }

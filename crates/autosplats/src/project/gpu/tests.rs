@@ -7,7 +7,7 @@ use super::*;
 use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::points::Points;
-use crate::project::{PointValues, ProjectRules, Projector, ScreenPoints, SlotTable, Uploader};
+use crate::project::{COUNTED_BLOCK_PX, PointValues, ProjectRules, Projector, ScreenPoints, SlotTable, Uploader};
 use crate::test_clouds::{self, EYE};
 
 const K: u32 = 10;
@@ -137,7 +137,20 @@ fn project_into(
     recorder.finish();
     let pixels = view.width as usize * view.height as usize;
     let sixteenths = read_back(gpu, &screen.sixteenths, pixels.div_ceil(2)).expect("sixteenths");
+    let expected = held_by_blocks(&sixteenths, screen.size);
+    assert!(read_back::<u32>(gpu, &screen.held, expected.len()).expect("counts") == expected, "sixteenths of blocks");
     (read_screen(gpu, screen).0, sixteenths)
+}
+
+/// Number of sixteenths with points in each small block, from their words.
+pub(crate) fn held_by_blocks(words: &[u32], [width, height]: [u32; 2]) -> Vec<u32> {
+    let [columns, rows] = [width, height].map(|side| (side as usize).div_ceil(COUNTED_BLOCK_PX));
+    let mut held = vec![0; columns * rows];
+    for pixel in 0..(width * height) as usize {
+        let [x, y] = [pixel % width as usize, pixel / width as usize].map(|at| at / COUNTED_BLOCK_PX);
+        held[y * columns + x] += ((words[pixel / 2] >> (16 * (pixel % 2))) & 0xffff).count_ones();
+    }
+    held
 }
 
 /// Fraction of the points of `a` that own another pixel, or none, in `b`.

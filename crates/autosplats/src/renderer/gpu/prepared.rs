@@ -7,8 +7,8 @@ use rayon::join;
 use crate::Error;
 use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
 use crate::camera::{PlacedView, Reprojection, View};
-use crate::fit::gpu::{FitPasses, surfel_buffer};
-use crate::fit::orient::gpu::OrientPasses;
+use crate::fit::gpu::{FitPass, surfel_buffer};
+use crate::fit::orient::gpu::OrientPass;
 use crate::gpu::{FrameUniform, Gpu, Step};
 use crate::points::Points;
 use crate::project::DeviceCloud;
@@ -20,7 +20,6 @@ use crate::renderer::{Reconstruction, Settings};
 use crate::search::SearchEngine;
 use crate::search::engine::{EnginePasses, EngineSteps, SearchBuffers};
 use crate::search::gpu::compile;
-use crate::search::past::gpu::{PastPasses, past_buffer};
 use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::shade::gpu::{ShadeBuffers, ShadePasses, ShadeUniform, finds_range};
 use crate::shade::over_time::gpu::{LastPictureBuffers, PictureOverTimePasses};
@@ -37,10 +36,9 @@ type SearchKind = (Discriminant<SearchEngine>, u32);
 pub(super) struct Passes {
     project: ProjectPasses,
     search: Option<(SearchKind, Box<dyn EnginePasses>)>,
-    past: PastPasses,
-    fit: FitPasses,
+    fit: FitPass,
     /// Compiled for the first cloud with sensors.
-    orient: Option<OrientPasses>,
+    orient: Option<OrientPass>,
     /// Compiled for the first adaptive frame.
     adapt: Option<AdaptPasses>,
     /// Compiled for the first smoothed frame.
@@ -53,15 +51,13 @@ impl Passes {
     pub(super) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let (project, others) = join(
             || ProjectPasses::new(gpu, Nearest::best(gpu)),
-            || join(|| Ok::<_, Error>((PastPasses::new(gpu)?, FitPasses::new(gpu)?)), || ShadePasses::new(gpu)),
+            || join(|| FitPass::new(gpu), || ShadePasses::new(gpu)),
         );
-        let (past_and_fit, shade) = others;
-        let (past, fit) = past_and_fit?;
+        let (fit, shade) = others;
         let passes = Self {
             project: project?,
             search: None,
-            past,
-            fit,
+            fit: fit?,
             orient: None,
             adapt: None,
             over_time: None,
@@ -89,7 +85,7 @@ impl Passes {
             || {
                 join(
                     || unless(splats, || SplatPasses::new(gpu, shape.channels, shape.trim, &linear_steps())),
-                    || join(|| unless(orients, || OrientPasses::new(gpu)), || unless(averages, over_time)),
+                    || join(|| unless(orients, || OrientPass::new(gpu)), || unless(averages, over_time)),
                 )
             },
         );
@@ -180,6 +176,8 @@ pub(super) struct Prepared {
     shape: Shape,
     /// The last frame, if there is one: view, identity of its points and how it was made.
     pub(super) seen: Option<(PlacedView, u64, PictureSettings)>,
+    /// The half of [`ScreenBuffers::past`] that the last frame wrote.
+    pub(super) past_half: u32,
     pub(super) screen: ScreenBuffers,
     /// [`Surfel`](crate::fit::Surfel) per query.
     pub(super) surfels: wgpu::Buffer,
@@ -201,14 +199,16 @@ impl Prepared {
         settings: &Settings,
     ) -> Result<Self, Error> {
         passes.compile(gpu, &shape, settings)?;
-        let Passes { project, search, past, fit, orient, adapt, over_time, splat, shade } = passes;
+        let Passes { project, search, fit, orient, adapt, over_time, splat, shade } = passes;
         let (Some((_, search)), Some((_, splat))) = (search, splat) else { unreachable!("they were just compiled") };
         let adapt = adapt.as_ref().filter(|_| shape.adapt);
         let Shape { size: picture_size, margin_px, halves, .. } = shape;
         let size = picture_size.map(|side| side + 2 * margin_px);
-        let screen = ScreenBuffers::new(gpu, size, halves, cloud.capacity(), cloud.words())?;
+        let mut screen = ScreenBuffers::new(gpu, size, halves, cloud.capacity(), cloud.words())?;
+        if shape.coherent {
+            screen = screen.keeping_past(gpu)?;
+        }
         let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
-        let past_radii = past_buffer(gpu, shape.coherent.then_some(size))?;
         let surfels = surfel_buffer(gpu, screen.capacity)?;
         let adapt = match adapt {
             Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
@@ -228,8 +228,7 @@ impl Prepared {
             None => None,
         };
         let (steps, convergence) = gpu.checked(|| {
-            let buffers =
-                SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods, past: &past_radii };
+            let buffers = SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods };
             let EngineSteps { rounds: mut searches, convergence } = search.steps(gpu, buffers)?;
             let mut steps = Vec::new();
             for stage in Stage::list(rules) {
@@ -242,7 +241,7 @@ impl Prepared {
                     }
                     Stage::Search(round) => steps.append(&mut searches[round as usize]),
                     Stage::Fit(round) => {
-                        steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
+                        steps.push(fit.step(gpu, frame, &screen, &neighborhoods, &surfels, round));
                     }
                     Stage::Adapt(round) => {
                         if let Some((passes, buffers)) = &adapt {
@@ -264,9 +263,6 @@ impl Prepared {
                     }
                     Stage::Recover => steps.extend(splat.steps_recover(gpu, frame, &screen)),
                     Stage::Keep => {
-                        if shape.coherent {
-                            steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));
-                        }
                         if let Some((passes, buffers)) = &over_time {
                             steps.extend(passes.steps_keep(gpu, frame, &screen, &surfels, buffers));
                         }
@@ -293,7 +289,7 @@ impl Prepared {
             }
             Ok::<_, Error>((steps, convergence))
         })??;
-        Ok(Self { shape, seen: None, screen, surfels, layers, picture, convergence, steps })
+        Ok(Self { shape, seen: None, past_half: 0, screen, surfels, layers, picture, convergence, steps })
     }
 
     /// Whether the steps fit frames of this shape.
@@ -313,7 +309,10 @@ impl Prepared {
     ) {
         let Settings { reconstruction, .. } = settings;
         let now = points.placed(*view);
-        let frame_uniform = uniform(view, rules, reconstruction.engine);
+        // A frame that was given up leaves none to look back at.
+        self.past_half = 1 - self.past_half;
+        let past_half = self.past_half;
+        let frame_uniform = FrameUniform { past_half, ..uniform(view, rules, reconstruction.engine) };
         // New steps have no last frame to look back at. A change of k always makes new steps.
         let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.average);
         let reprojected = past.and_then(|(past, known, made)| Some((Reprojection::new(&now, &past)?, known, made)));

@@ -6,6 +6,7 @@ use crate::gpu::{INT64_ATOMICS, INT64_IN_LANES, PassSource, link};
 
 mod dispatches;
 mod layouts;
+mod past;
 
 /// Whether a pass is a render pass: all of them blend.
 fn is_raster(pass: &PassSource) -> bool {
@@ -15,7 +16,6 @@ fn is_raster(pass: &PassSource) -> bool {
 fn passes() -> impl Iterator<Item = &'static PassSource> {
     let stages = [
         crate::project::gpu::PASSES,
-        crate::search::past::gpu::PASSES,
         crate::search::screen_grid::gpu::PASSES,
         crate::search::splat_communication::gpu::PASSES,
         crate::search::splat_communication::compute::PASSES,

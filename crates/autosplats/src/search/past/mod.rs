@@ -5,7 +5,6 @@
 //! instead of a radius from the local density. The starting radius does not change the result: an engine counts
 //! neighbours in any case, and a wrong start only takes longer. See docs/decisions/0014-frame-to-frame.md.
 
-pub(crate) mod gpu;
 #[cfg(test)]
 pub(crate) mod tests;
 

@@ -77,12 +77,12 @@ pub(crate) fn neighborhood_buffer(gpu: &Gpu, capacity: u32) -> Result<wgpu::Buff
 /// The passes of the search.
 #[derive(Debug)]
 pub(crate) struct SearchPasses {
-    /// Searches four queries at a time, if k is large enough, and leaves some queries to `one`.
-    four: Option<Pass>,
+    /// Searches four queries at a time, if k is large enough, and leaves some queries to `one`, whose workgroups are
+    /// counted between.
+    four: Option<(Pass, WorkPass)>,
     one: Pass,
     /// Searches the queries that `one` leaves.
     together: Option<Pass>,
-    work: WorkPass,
 }
 
 impl SearchPasses {
@@ -99,15 +99,15 @@ impl SearchPasses {
         let left_only = ("LEFT_ONLY", f64::from(u8::from(form == Form::Four)));
         let most_rounds = |rounds: u32| ("MOST_ROUNDS", rounds.into());
         let alone = most_rounds(if form == Form::OneOrMany { ROUNDS_ALONE } else { u32::MAX });
-        let pass = |of: Form, source, constants: &[_]| {
-            if of == form { Pass::new(gpu, source, &[&[common], constants].concat()).map(Some) } else { Ok(None) }
-        };
-        Ok(Self {
-            four: pass(Form::Four, &SEARCH_FOUR, &[])?,
-            one: Pass::new(gpu, &SEARCH, &[common, alone, left_only])?,
-            together: pass(Form::OneOrMany, &SEARCH_TOGETHER, &[most_rounds(u32::MAX)])?,
-            work: WorkPass::new(gpu)?,
-        })
+        let (mut four, mut together) = (None, None);
+        match form {
+            Form::Four => four = Some((Pass::new(gpu, &SEARCH_FOUR, &[common])?, WorkPass::new(gpu)?)),
+            Form::One => {}
+            Form::OneOrMany => {
+                together = Some(Pass::new(gpu, &SEARCH_TOGETHER, &[common, most_rounds(u32::MAX)])?);
+            }
+        }
+        Ok(Self { four, one: Pass::new(gpu, &SEARCH, &[common, alone, left_only])?, together })
     }
 
     /// Finds the neighbourhoods of the queries of `round`.
@@ -117,14 +117,13 @@ impl SearchPasses {
         frame: &wgpu::Buffer,
         screen: &ScreenBuffers,
         neighborhoods: &wgpu::Buffer,
-        past: &wgpu::Buffer,
         round: Round,
     ) -> Vec<Step> {
-        let ScreenBuffers { counters, density, cell_start, points, queries, left, .. } = screen;
+        let ScreenBuffers { counters, density, cell_start, points, queries, left, past, .. } = screen;
         let buffers = [frame, counters, density, cell_start, points, queries, neighborhoods, left, past];
-        let Self { four, one, together, work } = self;
+        let Self { four, one, together } = self;
         match four {
-            Some(four) => vec![
+            Some((four, work)) => vec![
                 four.step(gpu, &buffers, screen.groups(round.work_256())),
                 work.step(gpu, frame, screen),
                 one.step(gpu, &buffers, screen.groups(round.left_64())),

@@ -14,7 +14,6 @@ use crate::project::{ProjectRules, ScreenPoints};
 use crate::search::SearchRules;
 use crate::search::engine::{EnginePasses, SearchBuffers};
 use crate::search::gpu::convergence;
-use crate::search::past::gpu::past_buffer;
 use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::search::screen_grid::gpu::tests::{Moments, cameras, frame_buffer, on_host, projected};
 use crate::test_clouds;
@@ -86,9 +85,7 @@ fn by(gpu: &Gpu, passes: &dyn EnginePasses, screen: &ScreenPoints, view: &View, 
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
     let frame = frame_buffer(gpu, view, rules);
     let cloud = DeviceCloud::default();
-    let past = past_buffer(gpu, None).expect("room");
-    let searched =
-        SearchBuffers { frame: &frame, cloud: &cloud, screen: &buffers, neighborhoods: &neighborhoods, past: &past };
+    let searched = SearchBuffers { frame: &frame, cloud: &cloud, screen: &buffers, neighborhoods: &neighborhoods };
     let steps = passes.steps(gpu, searched).expect("steps");
     for (round, steps) in [Round::Active, Round::Recovered].into_iter().zip(&steps.rounds) {
         run_round(gpu, &buffers, round, steps);

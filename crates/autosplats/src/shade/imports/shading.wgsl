@@ -66,7 +66,7 @@ fn to_world(direction: vec3f) -> vec3f {
 fn shown_value(pixel: vec2u, index: u32, depth: f32) -> f32 {
     switch SHOWN {
         case SHOW_HEIGHT: {
-            let position_view = unproject(vec2f(pixel + frame.margin) + 0.5, depth);
+            let position_view = unproject(vec2f(pixel + margin()) + 0.5, depth);
             return dot(to_world(position_view * frame.unstretched.xyz) + frame.eye_local, shading.up);
         }
         case SHOW_RADIUS: {

@@ -32,8 +32,8 @@ fn over_time(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     if !is_finite(depth) {
         return;
     }
-    let position = past_position(unproject(vec2f(pixel + frame.margin) + 0.5, depth));
-    let place = past_place(position) - f32(frame.margin) - 0.5;
+    let position = past_position(unproject(vec2f(pixel + margin()) + 0.5, depth));
+    let place = past_place(position) - f32(margin()) - 0.5;
     let inside = all(place >= vec2f(0.0)) && all(place < vec2f(frame.picture) - 1.0);
     if !(inside && position.z > frame.near) {
         return;

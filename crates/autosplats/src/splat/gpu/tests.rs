@@ -10,7 +10,7 @@ use crate::adapt::Noise;
 use crate::camera::View;
 use crate::fit::Surfel;
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
-use crate::project::gpu::tests::{find_work, run_round};
+use crate::project::gpu::tests::{find_work, held_by_blocks, run_round};
 use crate::project::gpu::{COUNTERS, DensityCell};
 use crate::project::{DensityGrid, ScreenPoint};
 use crate::test_clouds::Random;
@@ -68,6 +68,7 @@ impl Scene<'_> {
         gpu.queue.write_buffer(&screen.depth, 0, bytemuck::cast_slice(&none));
         let words = sixteenths(self.surfels, self.view).words();
         gpu.queue.write_buffer(&screen.sixteenths, 0, bytemuck::cast_slice(&words));
+        gpu.queue.write_buffer(&screen.held, 0, bytemuck::cast_slice(&held_by_blocks(&words, size)));
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
         let uniform = FrameUniform { splat_scale: SPLAT_SCALE, ..FrameUniform::new(self.view, 1) };
         gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&uniform));

@@ -1,22 +1,24 @@
-// Blocks of pixels, row by row.
-
-struct Block {
-    // The number of sixteenths with points, and `EMPTY_BLOCK` if no pixel is covered; only in frames with noise.
-    held: u32,
-    // A bit for each pixel, row by row, that is empty, and in the high 16 bits for each that is in a core.
-    rims: u32,
-}
+// Blocks of pixels. Behind those of patches, `cover` has an element for each block, row by row. Its `point` has a bit
+// for each of the block's pixels, row by row, that is empty, and in the high 16 bits for each that is in a core.
 
 #import frame
-
-const EMPTY_BLOCK = 0x80000000u;
+#import patches
 
 // Columns and rows of blocks.
 fn block_counts() -> vec2u {
     return (frame.size + BLOCK_PX - 1u) / BLOCK_PX;
 }
 
-// Rim of a pixel within its block: 1 if the pixel is empty, plus 0x10000 if it is in a core.
-fn rim_in(block: Block, pixel: vec2u) -> u32 {
-    return (block.rims >> (BLOCK_PX * (pixel.y % BLOCK_PX) + pixel.x % BLOCK_PX)) & 0x10001u;
+// Index of a block among blocks, and its place in `cover`.
+fn block_index(block: vec2u) -> u32 {
+    return block.y * block_counts().x + block.x;
+}
+
+fn block_mark(block: vec2u) -> u32 {
+    return frame.size.x * frame.size.y + patches().x * patches().y + block_index(block);
+}
+
+// The place of a pixel's bit.
+fn rim_bit(pixel: vec2u) -> u32 {
+    return BLOCK_PX * (pixel.y % BLOCK_PX) + pixel.x % BLOCK_PX;
 }

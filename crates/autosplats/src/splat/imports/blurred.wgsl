@@ -1,6 +1,6 @@
-// Borders that are blurred by noise: see the CPU form, `trim/blurred.rs`. The including pass binds `blocks` and
-// `cover`, and defines `SPLAT_WINDOW_PX`, `of_pixel_at`, `SILENT`, `YES` and `NO`. "Marked" sixteenths of pixels
-// hold points. See docs/decisions/0003-borders-of-noise.md.
+// Borders that are blurred by noise: see the CPU form, `trim/blurred.rs`. The including pass binds `held` and `cover`,
+// and defines `SPLAT_WINDOW_PX`, `of_pixel_at`, `SILENT`, `YES` and `NO`. "Marked" sixteenths of pixels hold points.
+// See docs/decisions/0003-borders-of-noise.md.
 
 #import frame
 #import blocks
@@ -88,8 +88,16 @@ fn steps_to_empty(pixel: vec2u, ahead: vec2f, most: u32) -> u32 {
     return 0u;
 }
 
+// Whether no pixel of a block is covered.
 fn is_empty_block(block: vec2u) -> bool {
-    return (blocks[block.y * block_counts().x + block.x].held & EMPTY_BLOCK) != 0u;
+    let first = BLOCK_PX * block;
+    let side = min(first + BLOCK_PX, frame.size) - first;
+    if countOneBits(cover[block_mark(block)].point & 0xffffu) < side.x * side.y {
+        return false;
+    }
+    // Most of the margin has no splats, although it may hold a surface.
+    let is_aside = beside_picture(first) > 0u && beside_picture(first + BLOCK_PX - 1u) > 0u;
+    return !(is_aside && held[block_index(block)] > 0u);
 }
 
 // Sum of the offsets of the empty blocks within `radius` pixels of a pixel's middle; near blocks weigh most. 0 if there
@@ -136,25 +144,25 @@ fn off(points: Moments, ahead: vec2f, blur: vec2f) -> f32 {
 
 // Number of marked sixteenths in a square of a grid; `side` is 1, 2 or 4 pixels.
 fn held_by(square: vec2u, side: u32) -> f32 {
-    var held = 0u;
+    var sum = 0u;
     if side == BLOCK_PX {
-        held = blocks[square.y * block_counts().x + square.x].held & ~EMPTY_BLOCK;
+        sum = held[block_index(square)];
     } else {
         let first = side * square;
         let more = min(first + side, frame.size) - first > vec2u(1u);
         let at = first.y * frame.size.x + first.x;
-        held = countOneBits(of_pixel_at(at));
+        sum = countOneBits(of_pixel_at(at));
         if more.x {
-            held += countOneBits(of_pixel_at(at + 1u));
+            sum += countOneBits(of_pixel_at(at + 1u));
         }
         if more.y {
-            held += countOneBits(of_pixel_at(at + frame.size.x));
+            sum += countOneBits(of_pixel_at(at + frame.size.x));
         }
         if all(more) {
-            held += countOneBits(of_pixel_at(at + frame.size.x + 1u));
+            sum += countOneBits(of_pixel_at(at + frame.size.x + 1u));
         }
     }
-    return f32(held);
+    return f32(sum);
 }
 
 // Moments and number of the marked sixteenths in a window of this radius around the middle of a pixel. The window lies
@@ -172,11 +180,11 @@ fn moments(pixel: vec2u, window: f32) -> Moments {
             let offset = vec2f(side * vec2u(x, y)) - vec2f(pixel) + 0.5 * f32(side) - 0.5;
             let near = 1.0 - dot(offset, offset) / (window * window);
             if near > 0.0 {
-                let held = held_by(vec2u(x, y), side);
-                let weight = held * (near * near * near);
+                let marked = held_by(vec2u(x, y), side);
+                let weight = marked * (near * near * near);
                 sums += weight * vec3f(1.0, offset);
                 squares += weight * vec3f(offset.x * offset.x, offset.x * offset.y, offset.y * offset.y);
-                count += held;
+                count += marked;
             }
         }
     }

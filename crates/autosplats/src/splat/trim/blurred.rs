@@ -32,7 +32,7 @@ use super::{EMPTY, Outline, Rim, SPLAT_WINDOW_PX};
 use crate::adapt::Noise;
 use crate::camera::View;
 use crate::fit::SUPPORT;
-use crate::project::{OCCUPANCY_BLOCK_PX, Sixteenths};
+use crate::project::{COUNTED_BLOCK_PX, OCCUPANCY_BLOCK_PX, Sixteenths};
 use crate::splat::layers::PixelSurface;
 use crate::splat::{TILE, Tiles};
 
@@ -80,7 +80,7 @@ pub(in crate::splat) const HALF_WAY_OFFSET_SHARE: f32 = 0.7;
 /// Distance beyond the fringe, in blocks, up to which empty blocks define the direction to the empty side.
 pub(in crate::splat) const BLOCKS_BEYOND_FRINGE: f32 = 2.0;
 /// Side of a block in pixels.
-pub(in crate::splat) const BLOCK_PX: usize = 4;
+pub(in crate::splat) const BLOCK_PX: usize = COUNTED_BLOCK_PX;
 
 const _: () = assert!(BLOCK_PX == 4, "pairs of pairs of pixels are blocks");
 /// Blocks along the side of a tile.

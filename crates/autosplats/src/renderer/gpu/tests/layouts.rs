@@ -68,7 +68,7 @@ fn mirrored() -> [Mirrored; 16] {
                 frames_averaged,
                 same_points,
                 picture,
-                margin,
+                past_half,
                 same_picture,
                 past_rotation,
                 past_shift,

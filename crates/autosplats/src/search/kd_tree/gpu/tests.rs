@@ -10,7 +10,6 @@ use crate::points::Points;
 use crate::project::gpu::tests::{run_round, upload_screen};
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{DeviceCloud, ProjectRules, Projector, ScreenPoints, Uploader};
-use crate::search::past::gpu::past_buffer;
 use crate::test_clouds::{self, EYE, Random};
 
 const SIZE: [u32; 2] = [121, 90];
@@ -58,14 +57,8 @@ fn find(gpu: &Gpu, passes: &KdTreePasses, positions: &[[f32; 3]], view: &View, k
     let told = FrameUniform { first_radius, ..FrameUniform::new(view, k) };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
     let tree = TreeBuffers::new(gpu, cloud.len()).expect("room");
-    let past = past_buffer(gpu, None).expect("room");
-    let buffers = SearchBuffers {
-        frame: &frame,
-        cloud: &device_cloud,
-        screen: &uploaded,
-        neighborhoods: &neighborhoods,
-        past: &past,
-    };
+    let buffers =
+        SearchBuffers { frame: &frame, cloud: &device_cloud, screen: &uploaded, neighborhoods: &neighborhoods };
     for (round, steps) in [Round::Active, Round::Recovered].into_iter().zip(&passes.steps_in(gpu, buffers, &tree)) {
         run_round(gpu, &uploaded, round, steps);
     }

@@ -10,7 +10,6 @@ use crate::project::gpu::tests::{run_round, upload_screen};
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::past::Past;
-use crate::search::past::gpu::past_buffer;
 use crate::search::{LANES, Lanes, NeighborhoodBlock, Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE, Random};
 
@@ -21,19 +20,10 @@ pub(crate) fn frame_buffer(gpu: &Gpu, view: &View, rules: &SearchRules) -> wgpu:
     frame_buffer_with(gpu, &told(view, rules))
 }
 
-/// The frame uniform after a frame with the same view and these k-radii, and a buffer of the radii.
-pub(crate) fn frame_buffer_after(
-    gpu: &Gpu,
-    view: &View,
-    rules: &SearchRules,
-    radii: Option<&[f32]>,
-) -> (wgpu::Buffer, wgpu::Buffer) {
-    let Some(radii) = radii else {
-        return (frame_buffer(gpu, view, rules), past_buffer(gpu, None).expect("room"));
-    };
+/// The frame uniform after a frame with the same view.
+fn frame_buffer_after(gpu: &Gpu, view: &View, rules: &SearchRules) -> wgpu::Buffer {
     let seen = PlacedView { view: *view, origin: DVec3::ZERO };
-    let told = told(view, rules).after(&Reprojection::new(&seen, &seen).expect("the same camera"));
-    (frame_buffer_with(gpu, &told), gpu.storage_with("past", radii).expect("room"))
+    frame_buffer_with(gpu, &told(view, rules).after(&Reprojection::new(&seen, &seen).expect("the same camera")))
 }
 
 fn told(view: &View, rules: &SearchRules) -> FrameUniform {
@@ -157,11 +147,15 @@ fn counted_on_device(
     rules: &SearchRules,
     radii: Option<&[f32]>,
 ) -> (Vec<Moments>, Vec<u32>) {
-    let buffers = upload_screen(gpu, screen, view);
+    let mut buffers = upload_screen(gpu, screen, view);
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
-    let (frame, past) = frame_buffer_after(gpu, view, rules, radii);
+    let mut frame = frame_buffer(gpu, view, rules);
+    if let Some(radii) = radii {
+        frame = frame_buffer_after(gpu, view, rules);
+        buffers.past = gpu.storage_with("past", radii).expect("room");
+    }
     for round in [Round::Active, Round::Recovered] {
-        run_round(gpu, &buffers, round, &passes.steps(gpu, &frame, &buffers, &neighborhoods, &past, round));
+        run_round(gpu, &buffers, round, &passes.steps(gpu, &frame, &buffers, &neighborhoods, round));
     }
     let found: Vec<Neighborhood> = read_back(gpu, &neighborhoods, screen.points.len()).expect("neighbourhoods");
     let counters = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");

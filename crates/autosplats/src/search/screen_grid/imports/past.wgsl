@@ -1,7 +1,7 @@
 // Temporal coherence: the k-radius that the last frame found at a point's position; see `search/past/mod.rs`. The
-// including pass binds `past`: the bits of a k-radius per pixel of the last frame, 0 where there is none. `past` has a
-// single element if no radii are kept.
+// including pass binds `past`.
 
+#import past_radii
 #import reproject
 
 // Radius to start the search of a point from; 0 if the last frame has no plausible one.
@@ -10,9 +10,9 @@ fn past_radius(position_view: vec3f, initial_radius: f32) -> f32 {
         return 0.0;
     }
     let pixel = past_pixel(past_position(position_view));
-    if pixel >= arrayLength(&past) {
+    if pixel == NO_PIXEL || past_at(pixel) >= arrayLength(&past) {
         return 0.0;
     }
-    let radius = bitcast<f32>(past[pixel]);
+    let radius = bitcast<f32>(past[past_at(pixel)]);
     return select(0.0, radius, radius >= PAST_FIRST_RADII_RANGE[0] * initial_radius && radius <= PAST_FIRST_RADII_RANGE[1] * initial_radius);
 }
