@@ -1,6 +1,6 @@
 // K-radii kept from frame to frame: `past` has the bits of one for each pixel of the last frame, then for each of this
-// frame, or the other way round; 0 where there is none. It has a single element if no radii are kept. The including pass
-// binds it.
+// frame, or the other way round; 0 where there is none. It has a single element if no radii are kept. The including
+// pass binds it.
 
 #import frame
 

@@ -1,6 +1,6 @@
-// Surfels adapted to noise, and shrunk where they are no surface: see the CPU form. The including pass binds `counters`,
-// `density`, `levels`, `statistics`, `sheets`, `depth_noise` and `surfels`. It imports `balls` or `later`, which define
-// who fits the balls that a surfel needs. See docs/decisions/0010-outliers.md.
+// Surfels adapted to noise, and shrunk where they are no surface: see the CPU form. The including pass binds
+// `counters`, `density`, `levels`, `statistics`, `sheets`, `depth_noise` and `surfels`. It imports `balls` or `later`,
+// which define who fits the balls that a surfel needs. See docs/decisions/0010-outliers.md.
 
 #import frame
 #import calls

@@ -70,8 +70,8 @@ fn dispatches_of_a_frame() {
     let usual = commands(Reconstruction::default());
     let of_the_paper =
         commands(Reconstruction { adaptive: false, points_per_pixel: 1, trim: false, ..Reconstruction::default() });
-    // Hardware has ten dispatches less, as it fills several levels of cells by one and measures all sizes of balls by one,
-    // and two more for long searches.
+    // Hardware has ten dispatches less, as it fills several levels of cells by one and measures all sizes of balls by
+    // one, and two more for long searches.
     assert_eq!(usual, Commands { dispatches: 52, single: 9, indirect: 30, passes: 1, chain: 50, bytes: 54_423_180 });
     assert_eq!(
         of_the_paper,
