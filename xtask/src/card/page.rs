@@ -25,7 +25,8 @@ Written by `cargo xtask card`. Changes here are lost.
 
 - With a graphics card this command measures. Without one, software Vulkan counts dispatches and bytes, and predictions
   stand in place of times.
-- *dispatches* are those of a frame. Software has ten more in *adapt*, which a card merges, and two less in *search*.
+- *dispatches* are those of a frame. Software has ten more in *adapt*, as a card merges levels of cells
+  and sizes of balls, and two less in *search*.
 - *chain* is how much longer a stage makes the longest chain of dispatches that wait for each other.
 - *MB* are the buffers that dispatches bind, twice where a pass may write. This is a bound by allocation, not traffic:
   buffers sized for the whole screen count whole, whatever a frame touches of them.

@@ -110,7 +110,9 @@ const SURFELS_PER_GROUP: [u32; 2] = [1, SMALL_GROUP];
 /// Ball sizes that are measured at first, the others only where these do not tell the noise; on hardware and on
 /// software. A size is judged by the next. Software saves the work. Hardware would wait longer for more dispatches.
 const FIRST_SCALES: [usize; 2] = [SCALES, 2];
-const _: () = assert!(MOST_SAMPLED as u32 % SMALL_GROUP == 0, "workgroups of the sample are full");
+const _: () = assert!(TOGETHER.is_multiple_of(8), "eight rows of a ball are summed up at a time");
+const _: () = assert!((MOST_SAMPLED as u32).is_multiple_of(SORTED_PER_GROUP[0]), "workgroups of the sample are full");
+const _: () = assert!((MOST_SAMPLED as u32).is_multiple_of(SORTED_PER_GROUP[1]), "workgroups of the sample are full");
 /// Clusters of a cell that are stored side by side.
 const BUNCH: usize = 4;
 /// Parts of the sample that have quantiles: its densest third, its sparsest third, all, and all by steady shares.
@@ -279,7 +281,7 @@ pub(crate) struct AdaptPasses {
     firsts: Vec<(usize, wgpu::Buffer)>,
     pick: Pass,
     scatter: Pass,
-    /// Workgroups of `scatter` for the sizes that are measured at first, and whether there are others.
+    /// Workgroups of `scatter` that sort the sample and measure the first sizes, and whether there are other sizes.
     scatters: u32,
     in_parts: bool,
     quantile: Pass,
@@ -301,6 +303,11 @@ impl AdaptPasses {
 
     /// Compiles the passes that suit hardware or software.
     fn for_kind(gpu: &Gpu, software: bool) -> Result<Self, Error> {
+        Self::in_parts(gpu, software, FIRST_SCALES[usize::from(software)])
+    }
+
+    /// Like [`for_kind`](Self::for_kind), with this number of ball sizes measured at first.
+    fn in_parts(gpu: &Gpu, software: bool, first_scales: usize) -> Result<Self, Error> {
         let kind = usize::from(software);
         let coarser = ("COARSER", COARSER[kind] as f64);
         let first = |level: usize| {
@@ -311,9 +318,10 @@ impl AdaptPasses {
         let step = COARSER[kind] + 1;
         let cells = &[("CELLS_PER_GROUP", CELLS_PER_GROUP[kind].into())][..];
         let balls = ("BALLS_PER_GROUP", BALLS_PER_GROUP[kind].into());
-        let first_scales = ("FIRST_SCALES", FIRST_SCALES[kind] as f64);
+        let of_first = ("FIRST_SCALES", first_scales as f64);
         let surfels = ("SURFELS_PER_GROUP", SURFELS_PER_GROUP[kind].into());
         let most_finest = ("MOST_FINEST", most_finest(gpu.most_bound()) as f64);
+        // What takes longest begins first.
         let [fit_balls, adapt, fit_sheets, scatter, fill, merge, pick, quantile, noise, ask] = Pass::all(
             gpu,
             [
@@ -324,8 +332,8 @@ impl AdaptPasses {
                 (&FILL, &[most_finest, coarser]),
                 (&MERGE, &[coarser]),
                 (&PICK, &[]),
-                (&QUANTILES, &[first_scales]),
-                (&NOISE, &[cells[0], first_scales, balls]),
+                (&QUANTILES, &[of_first]),
+                (&NOISE, &[cells[0], of_first, balls]),
                 (&ASK, &[]),
             ],
         )?;
@@ -336,8 +344,8 @@ impl AdaptPasses {
             pick,
             scatter,
             scatters: MOST_SAMPLED as u32 / SORTED_PER_GROUP[kind]
-                + (FIRST_SCALES[kind] * MOST_SAMPLED) as u32 / BALLS_PER_GROUP[kind],
-            in_parts: FIRST_SCALES[kind] < SCALES,
+                + (first_scales * MOST_SAMPLED) as u32 / BALLS_PER_GROUP[kind],
+            in_parts: first_scales < SCALES,
             quantile,
             noise,
             fit_sheets,

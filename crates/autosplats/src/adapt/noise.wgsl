@@ -1,7 +1,7 @@
 // The noise level: how far points scatter about the surface. See the CPU form. Counts the workgroups that fit sheets:
 // none where nothing is noisy. Those that fit balls are counted by `adapt`. Where the ball sizes that are measured at
-// first do not tell the noise, counts those that measure the others instead, and tells when it is run again. One
-// invocation.
+// first do not tell the noise, it counts those that measure the others instead; its second run then tells the noise.
+// One invocation.
 //
 // Reads: surfels, sampled, quantiles, levels, depth_noise. Reads and writes: picked. Writes: statistics, arguments.
 
@@ -32,7 +32,7 @@ override BALLS_PER_GROUP: u32;
 const SCATTER_ARGUMENTS = 3u;
 const QUANTILE_ARGUMENTS = 4u;
 
-// Whether a part's balls tell the noise up to a size, which is known by the next.
+// Whether a part's balls tell the noise. The last size that is measured cannot, as a size is judged by the next.
 fn tells_noise(part: u32, measured: u32) -> bool {
     for (var scale = 0u; scale + 1u < measured; scale++) {
         if quantiles[part * SCALES + scale].kind == OF_THIN_BALLS {

@@ -1,5 +1,5 @@
-// Attribute pass: the weighted mean of all living splats within ε of the depth map, and the rims for the trim [Paper,
-// §7].
+// Attribute pass: the weighted mean of all living splats within ε of the depth map, and for the trim the rims and the
+// bits of blocks [Paper, §7].
 //
 // Reads: linear, splats, tree, surfels, values, depth_map. Writes: surface, extras; reads and writes: cover. Does not
 // write again where a patch was and stays empty.
@@ -37,7 +37,7 @@ override BACK_SLOTS: u32;
 
 // What an earlier frame told of the patch.
 var<workgroup> was_left_empty: bool;
-// What is told of its blocks, row by row.
+// Columns and rows of blocks in a patch, and their bits, row by row.
 const PATCH_BLOCKS = PATCH / BLOCK_PX;
 var<workgroup> rims: array<atomic<u32>, PATCH_BLOCKS.x * PATCH_BLOCKS.y>;
 var<workgroup> normals: array<vec3f, BATCH>;
@@ -196,7 +196,7 @@ fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     if is_left_empty && !is_met {
         return;
     }
-    // Four rows are a block's.
+    // The upper four rows lie in one block, the lower four in the next.
     let own = own_offset(local) / BLOCK_PX;
     atomicOr(&rims[own.y * PATCH_BLOCKS.x + own.x], end(&upper, pixel));
     atomicOr(&rims[(own.y + 1u) * PATCH_BLOCKS.x + own.x], end(&lower, pixel + vec2u(0u, 4u)));

@@ -1,7 +1,8 @@
 // Trim: removes the tails that splats leave around a silhouette. The CPU form is `trim.rs`.
 //
 // Reads: centers, sixteenths, statistics, held. Reads and writes: surface, cover, extras. Writes: counters. Of other
-// pixels it reads only the rims, which no invocation writes. Squares that no splat meets are left as they are.
+// pixels it reads only the rims and the bits of blocks, which no invocation writes. Squares that no splat meets are
+// left as they are.
 
 #import frame
 #import blocks

@@ -8,7 +8,7 @@ use crate::fit::gpu::surfel_buffer;
 use crate::fit::{Surfel, Surfels};
 use crate::gpu::{FrameUniform, read_back, test_gpu};
 use crate::project::gpu::tests::{run_round, upload_screen};
-use crate::test_clouds::{self, noisy};
+use crate::test_clouds::{self, Random, noisy};
 
 /// Share of cells that may differ: rounding moves a few means into the next slab.
 const UNLIKE_CELLS: f64 = 1e-3;
@@ -20,6 +20,8 @@ struct DeviceResults {
     /// Clusters of each cell, level by level.
     cells: Cells,
     usual: FrameStatistics,
+    /// Whether the ball sizes that are measured at first did not tell the noise.
+    goes_on: bool,
     /// Of both rounds.
     surfels: Surfels,
 }
@@ -42,6 +44,7 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> DeviceResults {
     DeviceResults {
         cells: read_cells(gpu, &buffers, screen.size),
         usual: read_back(gpu, &buffers.statistics, 1).expect("statistics")[0],
+        goes_on: read_back::<u32>(gpu, &buffers.picked, MOST_SAMPLED + 2).expect("a sample")[MOST_SAMPLED + 1] > 0,
         surfels: read_back(gpu, &surfels, fitted.len()).expect("surfels"),
     }
 }
@@ -225,6 +228,33 @@ fn however_many_sum_up_a_ball_the_device_adapts_as_the_host_does() {
             compare_surfels(&made.surfels, &case.adapted())
                 .unwrap_or_else(|error| panic!("{name}, {software}: {error}"));
         }
+    }
+}
+
+/// The smallest balls tell what balls of all sizes do, or the others are measured too.
+#[test]
+fn sizes_that_are_measured_in_parts_tell_the_same() {
+    let Some(gpu) = test_gpu() else { return };
+    let mut random = Random::new(7);
+    let filled = (0..40_000).map(|_| std::array::from_fn(|_| 0.7 * random.signed())).collect();
+    let clouds = [
+        ("clean", test_clouds::sphere(20_000)),
+        ("noisy", noisy(test_clouds::bumpy(20_000), 0.015)),
+        ("few", test_clouds::sphere(100)),
+        ("filled", filled),
+    ];
+    for software in [false, true] {
+        let [parts, whole] = [2, SCALES].map(|first| AdaptPasses::in_parts(&gpu, software, first).expect("passes"));
+        let mut went_on = Vec::new();
+        for (name, positions) in &clouds {
+            let case = Case::new(positions, PROJECTIONS[0], [320, 240]);
+            let [in_parts, at_once] = [&parts, &whole].map(|passes| on_device(&gpu, passes, &case));
+            let [a, b] = [&in_parts, &at_once].map(|made| bytemuck::bytes_of(&made.usual).to_vec());
+            assert!(a == b, "{name}: {:?}, at once {:?}", in_parts.usual, at_once.usual);
+            assert!(in_parts.surfels == at_once.surfels && !at_once.goes_on, "{name}, {software}: other surfels");
+            went_on.push(in_parts.goes_on);
+        }
+        assert!(went_on.contains(&false) && went_on.contains(&true), "some need all sizes: {went_on:?}");
     }
 }
 

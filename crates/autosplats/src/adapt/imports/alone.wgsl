@@ -1,5 +1,6 @@
 // Balls that each invocation sums up by itself: on software, where invocations side by side would all solve the same
-// equations. Alternative: `together`.
+// equations. Software Vulkan silently ends an invocation after 65535 rounds of its loops in sum, so that one takes a
+// single ball, cell or surfel. Alternative: `together`.
 
 #import quadric
 

@@ -13,7 +13,7 @@ var<private> own_place: u32;
 
 // Sums of each invocation, vector by vector. Rows are one element longer than needed, so that they start in different
 // memory banks.
-const PART_ROW = 33u;
+const PART_ROW = TOGETHER + 1u;
 var<workgroup> parts: array<vec4f, MAX_SUM_VECTORS * PART_ROW>;
 var<workgroup> totals: array<vec4f, MAX_SUM_VECTORS>;
 

@@ -176,7 +176,7 @@ pub(super) struct Prepared {
     shape: Shape,
     /// The last frame, if there is one: view, identity of its points and how it was made.
     pub(super) seen: Option<(PlacedView, u64, PictureSettings)>,
-    /// The half of [`ScreenBuffers::past`] that the last frame wrote.
+    /// The half of [`ScreenBuffers::past`] that the last frame read. It wrote the other, which the next frame reads.
     pub(super) past_half: u32,
     pub(super) screen: ScreenBuffers,
     /// [`Surfel`](crate::fit::Surfel) per query.
@@ -309,7 +309,7 @@ impl Prepared {
     ) {
         let Settings { reconstruction, .. } = settings;
         let now = points.placed(*view);
-        // A frame that was given up leaves none to look back at.
+        // The halves take turns even where a frame was given up: then `seen` is empty, and none is read.
         self.past_half = 1 - self.past_half;
         let past_half = self.past_half;
         let frame_uniform = FrameUniform { past_half, ..uniform(view, rules, reconstruction.engine) };

@@ -2,6 +2,7 @@
 // `cover` and `extras`.
 
 #import frame
+#import picture
 
 struct ShadeUniform {
     // Direction of rising height, world space.
