@@ -58,7 +58,7 @@ fn fit_balls(
         }
         let surfel = workgroupUniformLoad(&shared_surfel);
         let out = adapted_by_balls(surfel, all.cell_px, all.cell_columns);
-        if local == 0u {
+        if tells() {
             keep_adapted(place, surfel, out);
         }
     }

@@ -77,7 +77,7 @@ const LIBRARY: Library = Library {
             CELLS_TO_COUNT, LEAST_ON, MAX_SURFACE_MEAN_RADII, MAX_SURFACE_VARIATION, MIN_SURFACE_WIDTH_RATIO,
             MIN_TESTED_FIRST_RADII, ON_DISC, ON_DISC_NOISE, SURFACE_BALL_K_RADII
         ),
-        constants![BUNCH, SAMPLE_PARTS, TILE, TOGETHER],
+        constants![BUNCH, QUANTILE_ARGUMENTS, SAMPLE_PARTS, SCATTER_ARGUMENTS, TILE, TOGETHER],
     ],
 };
 
@@ -113,6 +113,9 @@ const FIRST_SCALES: [usize; 2] = [SCALES, 2];
 const _: () = assert!(TOGETHER.is_multiple_of(8), "eight rows of a ball are summed up at a time");
 const _: () = assert!((MOST_SAMPLED as u32).is_multiple_of(SORTED_PER_GROUP[0]), "workgroups of the sample are full");
 const _: () = assert!((MOST_SAMPLED as u32).is_multiple_of(SORTED_PER_GROUP[1]), "workgroups of the sample are full");
+/// Places in [`AdaptBuffers::arguments`] of the workgroups that measure the other sizes, and that find their quantiles.
+const SCATTER_ARGUMENTS: u32 = 3;
+const QUANTILE_ARGUMENTS: u32 = 4;
 /// Clusters of a cell that are stored side by side.
 const BUNCH: usize = 4;
 /// Parts of the sample that have quantiles: its densest third, its sparsest third, all, and all by steady shares.
@@ -303,11 +306,11 @@ impl AdaptPasses {
 
     /// Compiles the passes that suit hardware or software.
     fn for_kind(gpu: &Gpu, software: bool) -> Result<Self, Error> {
-        Self::in_parts(gpu, software, FIRST_SCALES[usize::from(software)])
+        Self::with_first_scales(gpu, software, FIRST_SCALES[usize::from(software)])
     }
 
     /// Like [`for_kind`](Self::for_kind), with this number of ball sizes measured at first.
-    fn in_parts(gpu: &Gpu, software: bool, first_scales: usize) -> Result<Self, Error> {
+    fn with_first_scales(gpu: &Gpu, software: bool, first_scales: usize) -> Result<Self, Error> {
         let kind = usize::from(software);
         let coarser = ("COARSER", COARSER[kind] as f64);
         let first = |level: usize| {
@@ -398,9 +401,10 @@ impl AdaptPasses {
                 self.noise.step(gpu, &noise, 1),
             ]);
             if self.in_parts {
+                let counted = |place: u32| Groups::Counted(arguments.clone(), u64::from(place) * DISPATCH_BYTES);
                 steps.extend([
-                    self.scatter.step(gpu, &balls, Groups::Counted(arguments.clone(), 3 * DISPATCH_BYTES)),
-                    self.quantile.step(gpu, &quantile, Groups::Counted(arguments.clone(), 4 * DISPATCH_BYTES)),
+                    self.scatter.step(gpu, &balls, counted(SCATTER_ARGUMENTS)),
+                    self.quantile.step(gpu, &quantile, counted(QUANTILE_ARGUMENTS)),
                     self.noise.step(gpu, &noise, 1),
                 ]);
             }

@@ -28,9 +28,6 @@ override CELLS_PER_GROUP: u32;
 // Number of ball sizes that are measured at first, and balls of a workgroup that measures.
 override FIRST_SCALES: u32;
 override BALLS_PER_GROUP: u32;
-// Places of the arguments of the passes that measure the other sizes.
-const SCATTER_ARGUMENTS = 3u;
-const QUANTILE_ARGUMENTS = 4u;
 
 // Whether a part's balls tell the noise. The last size that is measured cannot, as a size is judged by the next.
 fn tells_noise(part: u32, measured: u32) -> bool {

@@ -1,6 +1,6 @@
-// K-radii kept from frame to frame: `past` has the bits of one for each pixel of the last frame, then for each of this
-// frame, or the other way round; 0 where there is none. If no radii are kept it has a single element, whatever that
-// holds: the past changes the work of a search, never its result. The including pass binds it.
+// K-radii kept from frame to frame. The halves of `past` have the bits of one for each pixel, 0 where there is none:
+// one half of the last frame, one of this frame. Without kept radii it has a single element. What that holds does not
+// matter, as the past changes the work of a search, never its result. The including pass binds it.
 
 #import frame
 

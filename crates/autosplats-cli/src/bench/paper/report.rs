@@ -105,8 +105,8 @@ impl Report<'_> {
         _ = write!(
             page,
             "\n## Table 1: finding the {K} nearest neighbours\n\n\
-             Times in milliseconds, medians of up to {FRAMES} frames after a first one that does not count. A frame of \
-             more than three seconds is measured once. In brackets: microseconds per point searched for, which are the \
+             Times in milliseconds, medians of up to {FRAMES} frames after a first one that does not count. If the first \
+             takes more than three seconds, it counts alone; it has no radii of a frame before. In brackets: microseconds per point searched for, which are the \
              reconstructed points, or all points for a kd-tree. \\* marks grid culling. Kd-trees hold all points and \
              are rebuilt in each frame, which is part of their time.\n\n\
              | scene | visible | reconstructed | paper: kd-tree | paper: Auto Splats |"
@@ -161,7 +161,7 @@ impl Report<'_> {
                       may, except those of splat communication by raster.";
         }
         *page += " The screen grid works differently from both: it reads neighbourhoods instead of drawing them in \
-                  about ten iterations, and it searches for visible points only, which a kd-tree of all points cannot \
+                  about ten iterations. It searches for visible points only, which a kd-tree of all points cannot \
                   know.\n";
     }
 
@@ -362,8 +362,9 @@ impl Report<'_> {
         *page += "\n## Figure 10: time per stage\n\n\
                   With grid culling, for several values of k. The paper's chart has no numbers; the search takes most \
                   of the time and grows with k, and fitting costs about as much as splatting. Here the search takes \
-                  most of the time only with splat communication, and fitting always costs less than splatting. Times \
-                  are medians of up to five frames, or of one frame of more than three seconds.\n\n";
+                  most of the time with splat communication. With the screen grid its share grows with k. \
+                  Fitting always costs less than splatting. Times are medians of up to five frames, or of a first \
+                  frame of more than three seconds.\n\n";
         let folder = self.folder;
         for scene in self.scenes {
             for method in Method::BY_STAGE {

@@ -244,7 +244,8 @@ fn sizes_that_are_measured_in_parts_tell_the_same() {
         ("filled", filled),
     ];
     for software in [false, true] {
-        let [parts, whole] = [2, SCALES].map(|first| AdaptPasses::in_parts(&gpu, software, first).expect("passes"));
+        let [parts, whole] = [FIRST_SCALES[1], SCALES]
+            .map(|first| AdaptPasses::with_first_scales(&gpu, software, first).expect("passes"));
         let mut went_on = Vec::new();
         for (name, positions) in &clouds {
             let case = Case::new(positions, PROJECTIONS[0], [320, 240]);

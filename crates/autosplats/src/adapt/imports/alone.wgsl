@@ -4,6 +4,7 @@
 
 #import quadric
 
+// Whether the invocation stores what it found.
 fn tells() -> bool {
     return true;
 }
