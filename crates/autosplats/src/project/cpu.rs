@@ -62,7 +62,7 @@ impl Projector {
         let keys = Keys::settle(keys, screen.sixteenths.blocks(), view, halves);
         let spacing_px = keys.mean_spacing();
         compact(&points, view, &keys, spacing_px, screen);
-        near.list(&points, view, k as usize + 1);
+        near.list(&points, view, k);
         append_near(&points, view, near, screen);
         measure_density(screen, view, spacing_px, k);
         split(rules, view, screen);

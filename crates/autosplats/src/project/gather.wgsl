@@ -49,7 +49,7 @@ fn gather(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         pixel = pixels[index];
     }
     // Listed points speak if they are near; the same points on the screen are silent then.
-    if near_first < visible && is_near_at(position_view, atomicLoad(&counters[CROWDED_OCTAVE])) != is_listed {
+    if near_first < visible && is_near_at(position_view, atomicLoad(&counters[LISTED_OCTAVES])) != is_listed {
         pixel |= SILENT;
         atomicAdd(&counters[SILENT_POINTS], 1u);
     }

@@ -28,8 +28,8 @@ const LIBRARY: Library = Library {
         Work::CONSTANTS,
         constants!(in cpu: MAX_SECOND_DEPTH_PX, OCCUPANCY_BLOCK_PX, STRIP_SPACINGS),
         constants!(in near:
-            FACE_CELLS, FIRST_OCTAVE, LISTED_OCTAVES, MOST_NEAR, NEAR_CELLS, NEAR_POINTS, NEAR_REACH, OCTAVES,
-            SPARSE_POINTS
+            FACE_CELLS, FIRST_OCTAVE, MOST_NEAR, NEAR_CELLS, NEAR_POINTS, NEAR_REACH, NEAR_REACHES, NEAR_REACH_GROWTH,
+            OCTAVES, OCTAVE_CELLS, SPARSE_POINTS
         ),
         constants![COUNTED_BLOCK_PX, ENTRY_WORDS, MARGIN_REACH, POINTS_PER_LANE, RANK_BLOCK_FLAGS],
     ],
@@ -119,8 +119,8 @@ indices! {
         Visible,
         /// Screen points without those.
         NearFirst,
-        /// Octave of the nearest crowded cell around the eye.
-        CrowdedOctave,
+        /// Octaves of distance from the eye whose sparse cells are listed.
+        ListedOctaves,
         /// Points that serve as neighbours only, because they are near or listed without being near.
         SilentPoints,
         /// Blocks of the screen that hold screen points.

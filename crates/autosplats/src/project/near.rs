@@ -7,10 +7,10 @@
 //! into the picture from there. A density per pixel counts hardly one of them.
 //!
 //! So the points of sparse cells are listed once more, after the screen points, wherever they lie. Those of the
-//! sparsest cells are *near*, unless a crowded cell is nearer to the eye. Near points seek their neighbours in that
-//! list, in space. Their entries among the screen points are silent, which means that they serve as neighbours only. A
-//! point close to a crowded cell is not near, because the list lacks its neighbours. See
-//! docs/decisions/0040-close-to-the-eye.md.
+//! sparsest cells are *near* if their neighbours are in that list: going away from them in all directions, as many
+//! points are met as they have neighbours before a cell that is not listed. Near points seek their neighbours in the
+//! list, in space. Their entries among the screen points are silent, which means that they serve as neighbours only.
+//! See docs/decisions/0067-neighbours-that-are-listed.md.
 // Differs from the paper: the paper knows no points outside the picture.
 
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -24,17 +24,21 @@ pub(super) const FACE_CELLS: usize = 8;
 pub(super) const OCTAVES: usize = 20;
 /// The first octave ends this many octaves beyond the near plane, at a thousandth of the way to where the eye looks.
 pub(super) const FIRST_OCTAVE: u32 = 6;
+/// Cells of an octave.
+pub(super) const OCTAVE_CELLS: u32 = (6 * FACE_CELLS * FACE_CELLS) as u32;
 /// Number of cells.
-pub(crate) const NEAR_CELLS: usize = OCTAVES * 6 * FACE_CELLS * FACE_CELLS;
+pub(crate) const NEAR_CELLS: usize = OCTAVES * OCTAVE_CELLS as usize;
 /// Most points of a sparse cell.
 pub(crate) const SPARSE_POINTS: u32 = 32;
 /// Most points of a cell whose points are near. A surface then is nearer than about twelve of its points' distances.
 pub(crate) const NEAR_POINTS: u32 = 16;
-/// Reach, as a share of the distance from the eye, within which a near point has sparse cells only.
+/// Reach, as a share of the distance from the eye, within which a near point has listed cells only.
 pub(crate) const NEAR_REACH: f32 = 0.15;
-/// Octaves beyond the nearest crowded cell whose sparse cells are listed, as neighbours.
-pub(super) const LISTED_OCTAVES: u32 = 1;
-/// Most points in the list of sparse cells. Beyond, no point is near: the work per neighbourhood is the list.
+/// Growth of the reach until the neighbours are met.
+pub(super) const NEAR_REACH_GROWTH: f32 = 1.5;
+/// Most reaches of a point; the last is 300 times as far as the eye.
+pub(super) const NEAR_REACHES: u32 = 20;
+/// Most points in the list of sparse cells, as the work per neighbourhood is the list. Octaves beyond are not listed.
 pub(crate) const MOST_NEAR: usize = 4096;
 
 /// The points of a frame per cell.
@@ -43,8 +47,10 @@ pub(super) struct NearCells {
     counts: Vec<AtomicU32>,
     /// [`SPARSE_POINTS`] ordinals of points for each cell; as many as counted are valid, in any order.
     entries: Vec<AtomicU32>,
-    /// The octave of the nearest crowded cell.
-    crowded: u32,
+    /// Number of octaves whose sparse cells are listed.
+    listed_octaves: u32,
+    /// Number of other points that a near point meets in listed cells.
+    neighbors: u32,
     /// Number of the first octave.
     first_octave: u32,
     /// Indices of the points of sparse cells, cell by cell, by the bits of their positions in each.
@@ -82,7 +88,7 @@ pub(super) fn cell([x, y, z]: [f32; 3], first_octave: u32) -> u32 {
 }
 
 fn octave_of(cell: u32) -> u32 {
-    cell / (6 * FACE_CELLS * FACE_CELLS) as u32
+    cell / OCTAVE_CELLS
 }
 
 impl NearCells {
@@ -112,21 +118,31 @@ impl NearCells {
         self.counts[cell as usize].load(Ordering::Relaxed)
     }
 
-    /// Lists the points of the sparse cells; none if they are too many or fewer than `fewest`, or if no point is near.
-    /// The order of the points does not matter, unless they are at the same place.
-    pub(super) fn list(&mut self, cloud: &SlotTable<'_>, view: &View, fewest: usize) {
-        let mut cells = 0..NEAR_CELLS as u32;
-        self.crowded = cells.find(|&cell| self.count(cell) > SPARSE_POINTS).map_or(OCTAVES as u32, octave_of);
-        let sparse = |&cell: &u32| {
-            (1..=SPARSE_POINTS).contains(&self.count(cell)) && octave_of(cell) <= self.crowded + LISTED_OCTAVES
+    /// Whether a cell misses no point in the list.
+    fn is_listed(&self, cell: u32) -> bool {
+        let count = self.count(cell);
+        count == 0 || count <= SPARSE_POINTS && octave_of(cell) < self.listed_octaves
+    }
+
+    /// Lists the points of the sparse cells; none if no more than `k` or if no point is near. The order of the points
+    /// does not matter, unless they are at the same place.
+    pub(super) fn list(&mut self, cloud: &SlotTable<'_>, view: &View, k: u32) {
+        let len = |octave: u32| {
+            let cells = (octave * OCTAVE_CELLS..(octave + 1) * OCTAVE_CELLS).map(|cell| self.count(cell));
+            cells.filter(|&count| count <= SPARSE_POINTS).sum::<u32>() as usize
         };
-        let total: usize = (0..NEAR_CELLS as u32).filter(sparse).map(|cell| self.count(cell) as usize).sum();
-        if !(fewest..=MOST_NEAR).contains(&total) {
+        let (mut octaves, mut total) = (0, 0);
+        while octaves < OCTAVES as u32 && total + len(octaves) <= MOST_NEAR {
+            total += len(octaves);
+            octaves += 1;
+        }
+        (self.listed_octaves, self.neighbors) = (octaves, k.min(NEAR_POINTS));
+        if total <= k as usize {
             return;
         }
         let place = |index: u32| cloud.to_view(index, view).to_array();
         let mut listed = Vec::with_capacity(total);
-        for cell in (0..NEAR_CELLS as u32).filter(sparse) {
+        for cell in (0..octaves * OCTAVE_CELLS).filter(|&cell| self.is_listed(cell)) {
             let first = listed.len();
             let entries = &self.entries[(cell * SPARSE_POINTS) as usize..][..self.count(cell) as usize];
             listed.extend(entries.iter().map(|entry| cloud.names.index(entry.load(Ordering::Relaxed))));
@@ -142,15 +158,35 @@ impl NearCells {
     pub(super) fn is_near(&self, position: [f32; 3]) -> bool {
         let at = |position: [f32; 3]| cell(position, self.first_octave);
         let own = at(position);
-        if self.count(own) > NEAR_POINTS || octave_of(own) > self.crowded {
+        if self.count(own) > NEAR_POINTS || !self.is_listed(own) {
             return false;
         }
         let [x, y, z] = position;
-        let reach = NEAR_REACH * x.abs().max(y.abs()).max(z.abs());
-        (0..27).all(|side| {
-            let [a, b, c] = [side % 3, side / 3 % 3, side / 9].map(|step| (step as f32 - 1.0) * reach);
-            self.count(at([x + a, y + b, z + c])) <= SPARSE_POINTS
-        })
+        let mut reach = NEAR_REACH * x.abs().max(y.abs()).max(z.abs());
+        // Cells with points, so that there are no more of them than points met.
+        let mut met = [0; NEAR_POINTS as usize + 1];
+        let (mut cells, mut points) = (0, 0);
+        for _ in 0..NEAR_REACHES {
+            for side in 0..27 {
+                let [a, b, c] = [side % 3, side / 3 % 3, side / 9].map(|step| (step as f32 - 1.0) * reach);
+                let cell = at([x + a, y + b, z + c]);
+                if !self.is_listed(cell) {
+                    return false;
+                }
+                let count = self.count(cell);
+                if count > 0 && points <= self.neighbors && !met[..cells].contains(&cell) {
+                    met[cells] = cell;
+                    cells += 1;
+                    points += count;
+                }
+            }
+            // The point itself is one of them.
+            if points > self.neighbors {
+                return true;
+            }
+            reach *= NEAR_REACH_GROWTH;
+        }
+        true
     }
 }
 
@@ -163,3 +199,6 @@ pub(super) fn clamped_pixel(position: [f32; 3], view: &View) -> u32 {
     let [x, y] = [(x as u32).min(view.width - 1), (y as u32).min(view.height - 1)];
     y << 16 | x
 }
+
+#[cfg(test)]
+mod tests;

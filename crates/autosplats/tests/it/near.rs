@@ -117,17 +117,21 @@ fn ground_under_the_eye_is_closed() {
     }
 }
 
-/// The field file `W04_aerial_1pt_m2.ply`, beside the repository in `../shared/field`.
-#[test]
-fn a_walk_over_an_aerial_scan() {
+/// A cloud of a file beside the repository, in `../shared`; none outside of CI if the file is missing.
+fn beside(path: &str) -> Option<PointCloud> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let data = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from);
-    let path = data.join("../field/W04_aerial_1pt_m2.ply");
+    let path = data.join(path);
     if !path.exists() {
         assert!(std::env::var_os("CI").is_none(), "{} is missing", path.display());
-        return;
+        return None;
     }
-    let cloud = autosplats_formats::read(&path, &()).expect("a cloud");
+    Some(autosplats_formats::read(&path, &()).expect("a cloud"))
+}
+
+#[test]
+fn a_walk_over_an_aerial_scan() {
+    let Some(cloud) = beside("../field/W04_aerial_1pt_m2.ply") else { return };
     for (mut renderer, backend) in crate::renderers().into_iter().zip(["CPU", "GPU"]) {
         for size in [[160, 120], [960, 540]] {
             for (view, camera) in cameras(cloud.origin() + DVec3::new(0.0, 0.0, 1.7), 60.0) {
@@ -138,6 +142,52 @@ fn a_walk_over_an_aerial_scan() {
                 let open = lower.filter(|&(x, y)| layers.weight[layers.index(x, y)] == 0.0).count();
                 assert_eq!(open, 0, "{size:?}, {view}, {backend}: open pixels");
             }
+        }
+    }
+}
+
+/// A dense thing behind the eye takes no near ground away.
+#[test]
+fn ground_before_a_pillar_is_closed() {
+    let mut random = Random::new(302);
+    let mut positions = ground(|_| 0.0, false, 0.0, 60).positions().to_vec();
+    positions.extend((0..20_000).map(|_| {
+        let turn = std::f32::consts::PI * random.signed();
+        [0.3 * turn.cos() - 0.35, 0.3 * turn.sin() - 2.6, 3.0 * random.unit()]
+    }));
+    let cloud = PointCloud::new(DVec3::ZERO, positions);
+    for (mut renderer, backend) in crate::renderers().into_iter().zip(["CPU", "GPU"]) {
+        for (view, camera) in cameras(DVec3::new(1.0, -2.0, 1.7), 60.0) {
+            let case = format!("{view}, {backend}");
+            closed(&mut renderer, &cloud, &camera, [480, 360], &|_| 0.0, usize::MAX, &case);
+        }
+    }
+}
+
+/// From where its sensor stood, a scan of a street shows what the sensor saw. A few points of it lie close to the
+/// eye, with nothing around.
+#[test]
+fn a_street_from_its_sensor() {
+    let Some(cloud) = beside("sequences/kitti_drive_pcd/000000.pcd") else { return };
+    let size = [320, 180];
+    for (mut renderer, backend) in crate::renderers().into_iter().zip(["CPU", "GPU"]) {
+        for ahead in [[10.0, 0.0, -1.0], [7.0, -7.0, -3.0], [0.0, 10.0, -1.0], [-10.0, 0.0, -2.0]] {
+            let look_at = DVec3::from(ahead);
+            let projection = Projection::PerspectiveFovDeg(60.0);
+            let camera = Camera { eye: DVec3::ZERO, look_at, up: DVec3::Z, projection };
+            let settings = Settings { all_layers: true, ..Settings::default() };
+            let layers = renderer.render(&cloud, &camera, size, &settings).expect("a picture").layers;
+            let lens = camera.lens(size).expect("a camera");
+            let (mut seen, mut hidden) = (0, 0);
+            for (pixel, depth) in (0..cloud.len()).filter_map(|index| lens.to_pixel(cloud.world_position(index))) {
+                if pixel.cmpge(DVec2::ZERO).all() && pixel.cmplt(DVec2::from(size.map(f64::from))).all() {
+                    let shown = layers.depth[layers.index(pixel.x as usize, pixel.y as usize)];
+                    seen += 1;
+                    hidden += usize::from(f64::from(shown) < 0.7 * depth);
+                }
+            }
+            assert!(seen > 1000, "{seen} points in the picture");
+            assert!(hidden * 10 < seen, "{ahead:?}, {backend}: {hidden} of {seen} points are hidden");
         }
     }
 }

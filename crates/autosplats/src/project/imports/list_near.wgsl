@@ -10,15 +10,14 @@
 const CELLS_EACH = NEAR_CELLS / LARGE_GROUP;
 
 var<workgroup> before: array<u32, LARGE_GROUP + 1u>;
-// Octave of the nearest crowded cell.
-var<workgroup> crowded: atomic<u32>;
+// Points in the sparse cells of each octave.
+var<workgroup> in_octave: array<atomic<u32>, OCTAVES>;
 // 1 if any point is near.
 var<workgroup> any_near: atomic<u32>;
 
-// Number of points of a cell if it is listed, else 0.
-fn listed_len(cell: u32) -> u32 {
-    let is_listed = near[cell] <= SPARSE_POINTS && octave_of(cell) <= atomicLoad(&crowded) + LISTED_OCTAVES;
-    return select(0u, near[cell], is_listed);
+// Number of points of a cell if it is sparse, else 0.
+fn sparse_len(cell: u32) -> u32 {
+    return select(0u, near[cell], near[cell] <= SPARSE_POINTS);
 }
 
 // Whether an entry comes before another: by the bits of positions, then by ordinal.
@@ -33,29 +32,40 @@ fn is_before(a: u32, b: u32) -> bool {
 
 // To be called by all invocations of one workgroup of LARGE_GROUP.
 fn list_near(local: u32) {
-    let first = local * CELLS_EACH;
     if local == 0u {
-        atomicStore(&crowded, OCTAVES);
         atomicStore(&any_near, 0u);
     }
-    workgroupBarrier();
-    for (var cell = first; cell < first + CELLS_EACH; cell++) {
-        if near[cell] > SPARSE_POINTS {
-            atomicMin(&crowded, octave_of(cell));
-        }
+    if local < OCTAVES {
+        atomicStore(&in_octave[local], 0u);
     }
     workgroupBarrier();
-    var own = 0u;
-    for (var cell = first; cell < first + CELLS_EACH; cell++) {
-        let len = listed_len(cell);
-        own += len;
-        for (var entry = 0u; entry < len && len <= NEAR_POINTS && atomicLoad(&any_near) == 0u; entry++) {
+    // Cells side by side go to different invocations, as points lie together.
+    for (var cell = local; cell < NEAR_CELLS; cell += LARGE_GROUP) {
+        atomicAdd(&in_octave[octave_of(cell)], sparse_len(cell));
+    }
+    workgroupBarrier();
+    var octaves = 0u;
+    var total = 0u;
+    while octaves < OCTAVES && total + atomicLoad(&in_octave[octaves]) <= MOST_NEAR {
+        total += atomicLoad(&in_octave[octaves]);
+        octaves += 1u;
+    }
+    let end = octaves * OCTAVE_CELLS;
+    for (var cell = local; cell < end; cell += LARGE_GROUP) {
+        let len = select(0u, near[cell], near[cell] <= NEAR_POINTS);
+        for (var entry = 0u; entry < len && atomicLoad(&any_near) == 0u; entry++) {
             let at = near_entries(cell) + entry * ENTRY_WORDS;
             let place = bitcast<vec3f>(vec3u(near[at + 1u], near[at + 2u], near[at + 3u]));
-            if is_near_at(place, atomicLoad(&crowded)) {
+            if is_near_at(place, octaves) {
                 atomicStore(&any_near, 1u);
             }
         }
+    }
+    let first = local * CELLS_EACH;
+    let last = min(first + CELLS_EACH, end);
+    var own = 0u;
+    for (var cell = first; cell < last; cell++) {
+        own += sparse_len(cell);
     }
     before[local + 1u] = own;
     workgroupBarrier();
@@ -66,12 +76,11 @@ fn list_near(local: u32) {
         }
     }
     workgroupBarrier();
-    let total = before[LARGE_GROUP];
-    let is_listed = frame.near_cells == 1u && atomicLoad(&any_near) == 1u && total > frame.k && total <= MOST_NEAR;
+    let is_listed = frame.near_cells == 1u && atomicLoad(&any_near) == 1u && total > frame.k;
     let near_first = counters[NEAR_FIRST];
     if local == 0u {
         let visible = near_first + select(0u, total, is_listed);
-        counters[CROWDED_OCTAVE] = atomicLoad(&crowded);
+        counters[LISTED_OCTAVES] = octaves;
         counters[VISIBLE] = visible;
         put_work(VISIBLE256, visible, LARGE_GROUP);
         // One block at least: the last tells how many points are active.
@@ -81,8 +90,8 @@ fn list_near(local: u32) {
         return;
     }
     var place = near_first + before[local];
-    for (var cell = first; cell < first + CELLS_EACH; cell++) {
-        let len = listed_len(cell);
+    for (var cell = first; cell < last; cell++) {
+        let len = sparse_len(cell);
         let first_entry = near_entries(cell);
         // Entries are in any order: each counts those before it.
         for (var entry = 0u; entry < len; entry++) {

@@ -4,7 +4,7 @@
 #import frame
 
 fn octave_of(cell: u32) -> u32 {
-    return cell / (6u * FACE_CELLS * FACE_CELLS);
+    return cell / OCTAVE_CELLS;
 }
 
 // Cell of a position in view space.
