@@ -23,7 +23,9 @@ fn hash_place(place: vec3f) -> u32 {
     let high = frame.eye_parts[0].xyz * cells;
     let whole = floor(high);
     let from_eye = (place * frame.unstretched.xyz) * frame.view_from_world;
-    let part = (high - whole) + frame.eye_parts[1].xyz * cells + from_eye * cells + CELL_SHIFT;
+    // Never below 0. Without `max`, compilers may add up `high` and `from_eye` first, which rounds by whole cells.
+    let rest = max(high - whole, vec3f(0.0));
+    let part = rest + frame.eye_parts[1].xyz * cells + from_eye * cells + CELL_SHIFT;
     let low_bits = whole - round(whole * 0x1p-32) * 0x1p32;
     let cell = vec3u(vec3i(low_bits) + vec3i(floor(part)));
     return mix_bits(mix_bits(mix_bits(cell.x) ^ cell.y) ^ cell.z);

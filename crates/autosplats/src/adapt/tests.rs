@@ -44,8 +44,20 @@ impl Case {
 
     /// Seen from `scale` times as far away.
     fn scaled(positions: &[[f32; 3]], projection: Projection, size: [u32; 2], scale: f64) -> Self {
-        let camera = Camera { eye: EYE * scale, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
-        Self::of(&PointCloud::new(DVec3::ZERO, positions.to_vec()), &camera, size)
+        Self::around(DVec3::ZERO, positions, projection, size, scale)
+    }
+
+    /// The same with the origin of the cloud at `origin`.
+    pub(crate) fn around(
+        origin: DVec3,
+        positions: &[[f32; 3]],
+        projection: Projection,
+        size: [u32; 2],
+        scale: f64,
+    ) -> Self {
+        let eye = origin + EYE * scale;
+        let camera = Camera { eye, look_at: origin, up: DVec3::new(0.1, -1.0, 0.0), projection };
+        Self::of(&PointCloud::new(origin, positions.to_vec()), &camera, size)
     }
 
     /// A room as a depth camera with coarse steps sees it, viewed from beside the camera.
@@ -108,7 +120,7 @@ impl Case {
     }
 
     fn of(cloud: &PointCloud, camera: &Camera, size: [u32; 2]) -> Self {
-        let view = camera.view(DVec3::ZERO, size).expect("a view");
+        let view = camera.view(cloud.origin(), size).expect("a view");
         let screen = Projector::default().project(cloud, &view, &ProjectRules::usual(K), &crate::cancel::NEVER).clone();
         let rules = SearchRules { k: K, outlier_expansions: Some(1), gap_factor: Some(4.0), lenient: true };
         let fit_rules = FitRules {

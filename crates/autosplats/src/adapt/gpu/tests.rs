@@ -1,5 +1,7 @@
 //! The stage on the GPU against the CPU, with the same surfels.
 
+use autosplats_cloud::glam::DVec3;
+
 use super::super::cells::{CellRow, Cells, Cluster, Level};
 use super::super::noise::Noise;
 use super::super::tests::{Case, K, PROJECTIONS, angle};
@@ -421,4 +423,19 @@ fn cells_of_any_picture_fit_into_what_devices_bind() {
             assert!(clusters.max(sheets) as u64 <= bound, "{size:?} takes {clusters} and {sheets} bytes of {bound}");
         }
     }
+}
+
+/// Where coordinates are those of a map, sums with the eye would round to whole cells of the sample.
+#[test]
+fn the_device_samples_what_the_host_does_far_from_the_origin() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = AdaptPasses::new(&gpu).expect("passes");
+    let positions = noisy(test_clouds::bumpy(20_000), 0.015);
+    let case = Case::around(DVec3::new(636_600.5, 7_405_500.25, 430.0), &positions, PROJECTIONS[0], [320, 240], 1.0);
+    let (device, host) = (on_device(&gpu, &passes, &case), case.usual());
+    compare_usual(device.usual, host).unwrap_or_else(|error| panic!("{error}"));
+    // The median tells that the sample is the same.
+    assert_eq!(device.usual.k_radius, host.k_radius, "median k-radius");
+    assert!(host.noise.level > 0.0, "noise is told");
+    compare_surfels(&device.surfels, &case.adapted()).unwrap_or_else(|error| panic!("{error}"));
 }
